@@ -1,0 +1,66 @@
+"""Optimal paths on terrain, with proof.
+
+The names below are the public face; each is imported at its first use, so that
+``import terrapath`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from . import metric, scenes
+    from .errors import FitError, InputError, MapError, OutsideSurfaceError, TerrapathError
+    from .free_space import Circle, FreeSpace
+    from .io import LayerSource, read_surface, write_route
+    from .metric import chord, curve_length, line_r
+    from .planners import RRT, Progress, RRTStar, plan
+    from .plotting import plot_route
+    from .problem import Path, Problem, Solution, Status
+    from .surface import Layer, Mask, Surface
+
+_MODULES = ("metric", "scenes")
+_NAMES = {
+    "FitError": "errors",
+    "InputError": "errors",
+    "MapError": "errors",
+    "OutsideSurfaceError": "errors",
+    "TerrapathError": "errors",
+    "Circle": "free_space",
+    "FreeSpace": "free_space",
+    "LayerSource": "io",
+    "read_surface": "io",
+    "write_route": "io",
+    "chord": "metric",
+    "curve_length": "metric",
+    "line_r": "metric",
+    "RRT": "planners",
+    "RRTStar": "planners",
+    "Progress": "planners",
+    "plan": "planners",
+    "plot_route": "plotting",
+    "Path": "problem",
+    "Problem": "problem",
+    "Solution": "problem",
+    "Status": "problem",
+    "Layer": "surface",
+    "Mask": "surface",
+    "Surface": "surface",
+}
+
+__all__ = ["__version__", *_MODULES, *_NAMES]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
+    if name in _NAMES:
+        return getattr(importlib.import_module(f".{_NAMES[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,261 @@
+"""The two surface classes, and their values, jets and metric at a point.
+
+A surface s(x1, x2) = (x1, x2, w_3 x_3, ..., w_n x_n) is the graph of n - 2 layers
+over the plane. ``Peaks`` is exact; ``Spline`` carries everything else.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .compiler import inner_kernel, kernel, per_class
+
+
+class Peaks(NamedTuple):
+    """Layers that are sums of Gaussian peaks a exp(-f r^2)."""
+
+    peaks: np.ndarray  # (p, 4) float64: amplitude a, falloff f, centre x1, centre x2; by layer
+    first: np.ndarray  # (layers + 1,) int64: peaks[first[k]:first[k + 1]] make up layer k
+    weights: np.ndarray  # (layers,) float64
+
+
+class Spline(NamedTuple):
+    """Layers that are uniform bicubic B-splines."""
+
+    coefficients: np.ndarray  # (layers, ny + 2, nx + 2) float64
+    weights: np.ndarray  # (layers,) float64
+    x0: float  # the first knot inside the domain
+    y0: float
+    dx: float  # knot spacing
+    dy: float
+
+
+class Jet(NamedTuple):
+    """Value and derivatives of one layer at a point."""
+
+    f: float
+    fx: float
+    fy: float
+    fxx: float
+    fxy: float
+    fyy: float
+
+
+class Metric(NamedTuple):
+    """The symmetric tensor h at a point (paper, section 3.2)."""
+
+    h11: float
+    h12: float
+    h22: float
+
+
+class Cell(NamedTuple):
+    """Spline cell of a point, and the position inside it, both in [0, 1]."""
+
+    i: int
+    j: int
+    u: float
+    v: float
+
+
+# Peaks
+
+
+@inner_kernel
+def peaks_value(surface, layer, x, y):
+    total = 0.0
+    for p in range(surface.first[layer], surface.first[layer + 1]):
+        dx = x - surface.peaks[p, 2]
+        dy = y - surface.peaks[p, 3]
+        total += surface.peaks[p, 0] * math.exp(-surface.peaks[p, 1] * (dx * dx + dy * dy))
+    return total
+
+
+@kernel
+def peaks_jet(surface, layer, x, y):
+    f, fx, fy, fxx, fxy, fyy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for p in range(surface.first[layer], surface.first[layer + 1]):
+        dx = x - surface.peaks[p, 2]
+        dy = y - surface.peaks[p, 3]
+        c = -2.0 * surface.peaks[p, 1]
+        g = surface.peaks[p, 0] * math.exp(0.5 * c * (dx * dx + dy * dy))
+        f += g
+        fx += c * dx * g
+        fy += c * dy * g
+        fxx += (c + c * c * dx * dx) * g
+        fxy += c * c * dx * dy * g
+        fyy += (c + c * c * dy * dy) * g
+    return Jet(f, fx, fy, fxx, fxy, fyy)
+
+
+@inner_kernel
+def peaks_metric(surface, x, y):
+    h11, h12, h22 = 1.0, 0.0, 1.0
+    for layer in range(surface.weights.shape[0]):
+        fx, fy = 0.0, 0.0
+        for p in range(surface.first[layer], surface.first[layer + 1]):
+            dx = x - surface.peaks[p, 2]
+            dy = y - surface.peaks[p, 3]
+            falloff = surface.peaks[p, 1]
+            g = surface.peaks[p, 0] * falloff * math.exp(-falloff * (dx * dx + dy * dy))
+            fx -= dx * g
+            fy -= dy * g
+        w = 4.0 * surface.weights[layer] * surface.weights[layer]
+        h11 += w * fx * fx
+        h12 += w * fx * fy
+        h22 += w * fy * fy
+    return Metric(h11, h12, h22)
+
+
+# Spline
+
+
+@inner_kernel
+def spline_cell(surface, x, y):
+    """The cell of (x, y), clamped to the outermost cells."""
+    s = (x - surface.x0) / surface.dx
+    t = (y - surface.y0) / surface.dy
+    i = min(max(int(math.floor(s)), 0), surface.coefficients.shape[2] - 4)
+    j = min(max(int(math.floor(t)), 0), surface.coefficients.shape[1] - 4)
+    return Cell(i, j, s - i, t - j)
+
+
+@inner_kernel
+def basis(u):
+    """The four uniform cubic B-splines that are alive at u in [0, 1]."""
+    r = 1.0 - u
+    return (
+        r * r * r / 6.0,
+        (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0,
+        (4.0 - 6.0 * r * r + 3.0 * r * r * r) / 6.0,
+        u * u * u / 6.0,
+    )
+
+
+@inner_kernel
+def basis_slope(u):
+    """First derivatives of ``basis``."""
+    r = 1.0 - u
+    return -0.5 * r * r, u * (1.5 * u - 2.0), r * (2.0 - 1.5 * r), 0.5 * u * u
+
+
+@inner_kernel
+def basis_curvature(u):
+    """Second derivatives of ``basis``."""
+    return 1.0 - u, 3.0 * u - 2.0, 1.0 - 3.0 * u, u
+
+
+@inner_kernel
+def along_row(coefficients, layer, row, i, b):
+    """Sum over the four coefficients of a row, weighted by b."""
+    return (
+        b[0] * coefficients[layer, row, i]
+        + b[1] * coefficients[layer, row, i + 1]
+        + b[2] * coefficients[layer, row, i + 2]
+        + b[3] * coefficients[layer, row, i + 3]
+    )
+
+
+@inner_kernel
+def tensor_sum(coefficients, layer, cell, bx, by):
+    """Sum over the sixteen coefficients of a cell, weighted by bx times by."""
+    i, j = cell.i, cell.j
+    return (
+        by[0] * along_row(coefficients, layer, j, i, bx)
+        + by[1] * along_row(coefficients, layer, j + 1, i, bx)
+        + by[2] * along_row(coefficients, layer, j + 2, i, bx)
+        + by[3] * along_row(coefficients, layer, j + 3, i, bx)
+    )
+
+
+@inner_kernel
+def spline_value(surface, layer, x, y):
+    cell = spline_cell(surface, x, y)
+    return tensor_sum(surface.coefficients, layer, cell, basis(cell.u), basis(cell.v))
+
+
+@kernel
+def spline_jet(surface, layer, x, y):
+    cell = spline_cell(surface, x, y)
+    bx, by = basis(cell.u), basis(cell.v)
+    sx, sy = basis_slope(cell.u), basis_slope(cell.v)
+    c, dx, dy = surface.coefficients, surface.dx, surface.dy
+    return Jet(
+        tensor_sum(c, layer, cell, bx, by),
+        tensor_sum(c, layer, cell, sx, by) / dx,
+        tensor_sum(c, layer, cell, bx, sy) / dy,
+        tensor_sum(c, layer, cell, basis_curvature(cell.u), by) / (dx * dx),
+        tensor_sum(c, layer, cell, sx, sy) / (dx * dy),
+        tensor_sum(c, layer, cell, bx, basis_curvature(cell.v)) / (dy * dy),
+    )
+
+
+@inner_kernel
+def spline_metric(surface, x, y):
+    cell = spline_cell(surface, x, y)
+    bx, by = basis(cell.u), basis(cell.v)
+    sx, sy = basis_slope(cell.u), basis_slope(cell.v)
+    h11, h12, h22 = 1.0, 0.0, 1.0
+    for layer in range(surface.weights.shape[0]):
+        w = surface.weights[layer]
+        fx = w * tensor_sum(surface.coefficients, layer, cell, sx, by) / surface.dx
+        fy = w * tensor_sum(surface.coefficients, layer, cell, bx, sy) / surface.dy
+        h11 += fx * fx
+        h12 += fx * fy
+        h22 += fy * fy
+    return Metric(h11, h12, h22)
+
+
+# Either class
+
+
+@per_class({Peaks: peaks_value, Spline: spline_value})
+def value_at(surface, layer, x, y):
+    """Value of one layer, in the layer's unit."""
+
+
+@per_class({Peaks: peaks_jet, Spline: spline_jet})
+def jet_at(surface, layer, x, y):
+    """Value, gradient and Hessian of one layer (unweighted)."""
+
+
+@per_class({Peaks: peaks_metric, Spline: spline_metric})
+def metric_at(surface, x, y):
+    """h = I + sum_k w_k^2 grad x_k grad x_k^T (paper, section 3.2)."""
+
+
+# Many points at once: points (m, 2); results are filled in
+
+
+@kernel
+def fill_values(surface, points, values):
+    """Values (m, layers)."""
+    for m in range(points.shape[0]):
+        for layer in range(surface.weights.shape[0]):
+            values[m, layer] = value_at(surface, layer, points[m, 0], points[m, 1])
+
+
+@kernel
+def fill_jets(surface, points, jets):
+    """Jets (m, layers, 6)."""
+    for m in range(points.shape[0]):
+        for layer in range(surface.weights.shape[0]):
+            jet = jet_at(surface, layer, points[m, 0], points[m, 1])
+            jets[m, layer, 0] = jet.f
+            jets[m, layer, 1] = jet.fx
+            jets[m, layer, 2] = jet.fy
+            jets[m, layer, 3] = jet.fxx
+            jets[m, layer, 4] = jet.fxy
+            jets[m, layer, 5] = jet.fyy
+
+
+@kernel
+def fill_metric(surface, points, tensors):
+    """Metric tensors (m, 2, 2)."""
+    for m in range(points.shape[0]):
+        h = metric_at(surface, points[m, 0], points[m, 1])
+        tensors[m, 0, 0] = h.h11
+        tensors[m, 0, 1] = h.h12
+        tensors[m, 1, 0] = h.h12
+        tensors[m, 1, 1] = h.h22

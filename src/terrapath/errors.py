@@ -1,0 +1,21 @@
+"""What goes wrong with an input. Every message names the value, the limit and the remedy."""
+
+
+class TerrapathError(Exception):
+    """Base of every error that Terrapath raises on purpose. The command exits with 2."""
+
+
+class InputError(TerrapathError, ValueError):
+    """An argument that cannot be used."""
+
+
+class OutsideSurfaceError(InputError):
+    """A point where the surface is not defined."""
+
+
+class FitError(InputError):
+    """A function that no spline of a reasonable size follows to the asked tolerance."""
+
+
+class MapError(TerrapathError):
+    """A file that cannot be read as a map, or written."""

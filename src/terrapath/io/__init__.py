@@ -1,0 +1,6 @@
+"""Floor 6: maps in, routes out."""
+
+from .maps import LayerSource, read_surface
+from .routes import route_record, write_route
+
+__all__ = ["LayerSource", "read_surface", "route_record", "write_route"]

@@ -1,0 +1,54 @@
+"""Planners by their names."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from ..errors import InputError
+from ..problem import Problem, Solution
+from .base import Callback, Planner
+from .rrt import RRT
+from .rrt_star import RRTStar
+
+PLANNERS: dict[str, Callable[..., Planner]] = {
+    "rrt-star-r": partial(RRTStar, metric="riemannian"),
+    "rrt-star": partial(RRTStar, metric="chord"),
+    "rrt": RRT,
+}
+
+
+def _fields(factory: Callable[..., Planner]) -> dict[str, Any]:
+    kind = factory.func if isinstance(factory, partial) else factory
+    fields: dict[str, Any] = kind.__dataclass_fields__  # type: ignore[attr-defined]
+    fixed = factory.keywords if isinstance(factory, partial) else {}
+    return {name: field for name, field in fields.items() if name not in fixed}
+
+
+def make_planner(name: str, **options: Any) -> Planner:
+    """The planner of that name with the given options.
+
+    Raises InputError for a name or an option that is not known, with the nearest known.
+    """
+    if name not in PLANNERS:
+        raise InputError(f"planner={name!r} is not known; choose one of {', '.join(PLANNERS)}")
+    known = _fields(PLANNERS[name])
+    for option in options:
+        if option not in known:
+            near = difflib.get_close_matches(option, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"its options are {', '.join(known)}"
+            raise InputError(f"planner {name} has no option {option!r}; {hint}")
+    return PLANNERS[name](**options)
+
+
+def plan(
+    problem: Problem,
+    planner: str = "rrt-star-r",
+    *,
+    callback: Callback | None = None,
+    **options: Any,
+) -> Solution:
+    """Solve a problem with any planner by its name; options as keywords."""
+    return make_planner(planner, **options).solve(problem, callback=callback)

@@ -1,0 +1,57 @@
+"""Plain RRT: the first path, fast, with no claim to be short."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..problem import Problem, Solution
+from ..validation import require_count, require_fraction, require_positive, require_seed
+from .base import Callback
+from .tree_search import TreeOptions, search_tree
+
+
+@dataclass(frozen=True, kw_only=True)
+class RRT:
+    """Plain RRT: RRT* without neighbours. It ends with the first path (LaValle 1998).
+
+    samples : at most this many. step : longest edge, map units; by default a twelfth of
+    the region's side. seed : of the one random generator. goal_bias : share of samples
+    that are the goal. time_limit : seconds.
+    """
+
+    samples: int = 10_000
+    step: float | None = None
+    seed: int = 0
+    goal_bias: float = 0.05
+    time_limit: float | None = None
+
+    def __post_init__(self) -> None:
+        require_count(samples=self.samples)
+        require_fraction(goal_bias=self.goal_bias)
+        require_seed(self.seed)
+        for name, value in (("step", self.step), ("time_limit", self.time_limit)):
+            if value is not None:
+                require_positive(**{name: value})
+
+    @property
+    def name(self) -> str:
+        """The planner's name on the command line."""
+        return "rrt"
+
+    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+        """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+        options = TreeOptions(
+            planner=self.name,
+            samples=int(self.samples),
+            step=self.step,
+            radius_factor=0.0,
+            goal_bias=self.goal_bias,
+            seed=int(self.seed),
+            riemannian=True,
+            prune=True,
+            informed=False,
+            time_limit=self.time_limit,
+            target_length=math.inf,
+        )
+        return search_tree(problem, options, callback)

@@ -1,0 +1,219 @@
+"""The loop around the tree kernels that RRT and RRT* share."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .._kernels import rrt_star as kernels
+from .._kernels.buckets import Buckets
+from ..problem import History, Path, Problem, SearchTree, Solution, Status
+from ..validation import Array
+from .base import Callback, Progress
+
+# Samples between two looks at the clock, the callback and Ctrl-C.
+CHUNK = 512
+
+# An edge is measured by one application of Line-R up to this many features of the surface.
+FEATURES_PER_PANEL = 4.0
+
+# The default step is this share of the side of a square as large as the bounds: 1.0 in the
+# paper's region of 12 x 12.
+STEPS_PER_SIDE = 12.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TreeOptions:
+    """What a tree planner hands to the shared loop."""
+
+    planner: str
+    samples: int
+    step: float | None
+    radius_factor: float
+    goal_bias: float
+    seed: int
+    riemannian: bool
+    prune: bool
+    informed: bool
+    panel: float | None = None
+    time_limit: float | None = None
+    target_length: float = 0.0
+
+
+def default_step(problem: Problem) -> float:
+    """A step that suits the region, map units."""
+    return math.sqrt(problem.bounds.width * problem.bounds.height) / STEPS_PER_SIDE
+
+
+def _kernel_options(problem: Problem, options: TreeOptions) -> kernels.Options:
+    bounds = problem.bounds
+    # Karaman and Frazzoli (2011), theorem 38 at d = 2; the kernel multiplies by the root of
+    # the area that is searched, which is at least that of the free space in it.
+    least = 2.0 * math.sqrt(1.5 / math.pi)
+    panel = options.panel or FEATURES_PER_PANEL * problem.surface.resolution
+    return kernels.Options(
+        *bounds,
+        *problem.goal,
+        step=float(options.step or default_step(problem)),
+        radius=float(options.radius_factor * least),
+        goal_bias=float(options.goal_bias),
+        panel=float(panel),
+        riemannian=options.riemannian,
+        prune=options.prune,
+        informed=options.informed,
+    )
+
+
+def _allocate(samples: int, layers: int) -> kernels.Tree:
+    size = samples + 2  # the start, and the goal that may join with the last sample
+    return kernels.Tree(
+        vertices=np.empty(size, kernels.VERTEX).view(np.recarray),
+        lifted=np.empty((size, layers)),
+        counters=np.zeros(kernels.COUNTERS, np.int64),
+        buckets=Buckets(np.empty(size // 2 + 64, np.int32), np.zeros(3), np.zeros(2, np.int64)),
+        near=np.empty(size, kernels.CANDIDATE).view(np.recarray),
+        stack=np.empty(size, np.int32),
+    )
+
+
+@dataclass
+class _Search:
+    """A running search: the tree, the clock and the history."""
+
+    problem: Problem
+    options: TreeOptions
+    settings: kernels.Options
+    tree: kernels.Tree
+    started: float = field(default_factory=time.perf_counter)
+    rows: list[tuple[int, float, float]] = field(default_factory=list)
+
+    @property
+    def seconds(self) -> float:
+        return time.perf_counter() - self.started
+
+    @property
+    def goal(self) -> int:
+        return int(self.tree.counters[kernels.GOAL])
+
+    @property
+    def best_cost(self) -> float:
+        return float(self.tree.vertices[self.goal].cost) if self.goal >= 0 else math.inf
+
+    @property
+    def samples(self) -> int:
+        return int(self.tree.counters[kernels.SAMPLES])
+
+    def note(self) -> Progress:
+        progress = Progress(self.samples, self.options.samples, self.seconds, self.best_cost)
+        self.rows.append((progress.samples, progress.seconds, progress.best_cost))
+        return progress
+
+    def grow(self, draws: Array) -> None:
+        kernels.grow(
+            self.problem.surface.data, self.problem.free_space.data, self.tree, self.settings, draws
+        )
+
+
+def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
+    """Why the search should end now; empty where it should not."""
+    options = search.options
+    progress = search.note()
+    if callback is not None and callback(progress):
+        return "callback"
+    if math.isfinite(progress.best_cost) and progress.best_cost <= options.target_length:
+        return "target length"
+    if options.time_limit is not None and progress.seconds >= options.time_limit:
+        return "time limit"
+    if progress.samples >= options.samples:
+        return "samples"
+    return ""
+
+
+def _run(search: _Search, callback: Callback | None) -> str:
+    """Grow the tree until there is a reason to stop, and return it.
+
+    The random numbers are one stream whatever the chunks, so how often the clock is
+    looked at changes nothing in the result.
+    """
+    random = np.random.Generator(np.random.PCG64(search.options.seed))
+    try:
+        while True:
+            chunk = min(CHUNK, search.options.samples - search.samples)
+            search.grow(random.random((chunk, 3)))
+            if reason := _reason_to_stop(search, callback):
+                return reason
+    except KeyboardInterrupt:
+        return "interrupt"
+
+
+def _path(problem: Problem, tree: kernels.Tree) -> Path | None:
+    vertex = int(tree.counters[kernels.GOAL])
+    if vertex < 0:
+        return None
+    points = []
+    while vertex >= 0:
+        row = tree.vertices[vertex]
+        points.append((row.x, row.y))
+        vertex = int(row.parent)
+    return problem.path(points[::-1])
+
+
+def _search_tree(tree: kernels.Tree) -> SearchTree:
+    rows = tree.vertices[: tree.counters[kernels.VERTICES]]
+    return SearchTree(np.column_stack([rows.x, rows.y]), rows.parent.copy(), rows.cost.copy())
+
+
+def _counters(tree: kernels.Tree) -> dict[str, int]:
+    places = {
+        "vertices": kernels.VERTICES,
+        "edges considered": kernels.CONSIDERED,
+        "edges pruned": kernels.PRUNED,
+        "edges integrated": kernels.INTEGRATED,
+        "edges tested for obstacles": kernels.CHECKED,
+        "edges rewired": kernels.REWIRED,
+    }
+    return {name: int(tree.counters[place]) for name, place in places.items()}
+
+
+def _stay_put(problem: Problem, options: TreeOptions) -> Solution:
+    """The answer where the start is the goal: a path of length 0."""
+    return Solution(
+        problem=problem,
+        planner=options.planner,
+        status=Status.SOLVED,
+        path=problem.path([problem.start, problem.goal]),
+        cost=0.0,
+        seconds=0.0,
+        seed=options.seed,
+        stopped_by="start is goal",
+    )
+
+
+def search_tree(problem: Problem, options: TreeOptions, callback: Callback | None) -> Solution:
+    """Grow a tree from the start until the options or the callback say stop."""
+    if problem.start == problem.goal:
+        return _stay_put(problem, options)
+    tree = _allocate(options.samples, len(problem.surface.layers))
+    search = _Search(problem, options, _kernel_options(problem, options), tree)
+    kernels.plant(problem.surface.data, tree, search.settings, *problem.start)
+    stopped_by = _run(search, callback)
+    seconds = search.seconds
+    path = _path(problem, tree)
+    status = Status.NOT_FOUND if path is None else Status.SOLVED
+    return Solution(
+        problem=problem,
+        planner=options.planner,
+        status=Status.INTERRUPTED if stopped_by == "interrupt" else status,
+        path=path,
+        cost=None if path is None else search.best_cost,
+        seconds=seconds,
+        samples=search.samples,
+        seed=options.seed,
+        stopped_by=stopped_by,
+        history=History(*np.array(search.rows, np.float64).reshape(-1, 3).T),
+        tree=_search_tree(tree),
+        counters=_counters(tree),
+    )

@@ -1,0 +1,229 @@
+"""What is asked and what is answered: problem, path, status, solution."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+
+from . import metric
+from .errors import InputError, OutsideSurfaceError
+from .free_space import FreeSpace, Obstacle
+from .surface import Surface
+from .validation import Array, Bounds, as_bounds, as_point
+
+# Points a segment is cut into to add up climb and draw profiles, unless the surface is finer.
+PROFILE_POINTS = 16
+
+
+class Problem:
+    """Find a short path on a surface from start to goal through free space.
+
+    surface : Surface. start, goal : (x1, x2), map units, in free space.
+    bounds : (x1_min, x2_min, x1_max, x2_max), map units; by default the surface's.
+    obstacles : shapely polygons and lines, ``Circle`` and ``Mask``, map units.
+    The surface's no-data cells are obstacles too.
+    Raises OutsideSurfaceError or InputError, naming the value and the remedy.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        start: Any,
+        goal: Any,
+        bounds: Any = None,
+        obstacles: Iterable[Obstacle] = (),
+        *,
+        name: str = "",
+    ) -> None:
+        self.surface = surface
+        self.name = name
+        self.bounds = self._make_bounds(surface, bounds)
+        given = [obstacles] if isinstance(obstacles, Obstacle) else list(obstacles)
+        nodata = [] if surface.nodata is None else [surface.nodata]
+        self.free_space = FreeSpace(self.bounds, [*given, *nodata])
+        self.start = self._check("start", start)
+        self.goal = self._check("goal", goal)
+
+    @staticmethod
+    def _make_bounds(surface: Surface, bounds: Any) -> Bounds:
+        if bounds is None:
+            if surface.bounds is None:
+                raise InputError(
+                    "bounds=None: the surface has no edge, so the region to plan in must be "
+                    "named; give bounds=(x1_min, x2_min, x1_max, x2_max)"
+                )
+            return surface.bounds
+        rectangle = as_bounds(bounds)
+        if surface.bounds is not None and not surface.bounds.encloses(rectangle):
+            raise OutsideSurfaceError(
+                f"bounds={tuple(rectangle)} reach beyond the surface, {surface.bounds}; "
+                "shrink them, or check the axis order or the CRS"
+            )
+        return rectangle
+
+    def _check(self, name: str, value: Any) -> tuple[float, float]:
+        point = as_point(value, name)
+        blocker = self.free_space.blocker(point)
+        if blocker is None:
+            return point
+        shown = f"{name}=({point[0]:.10g}, {point[1]:.10g})"
+        if blocker.startswith("outside"):
+            raise OutsideSurfaceError(f"{shown} is {blocker}; check the axis order or the CRS")
+        raise InputError(f"{shown} is {blocker}; move it to free ground")
+
+    def path(self, points: Any) -> Path:
+        """A path of this problem's surface through the given points."""
+        return Path(self.surface, np.asarray(points, np.float64))
+
+    @cached_property
+    def straight_length(self) -> float:
+        """Length on the surface of the straight way from start to goal, obstacles or not."""
+        return metric.curve_length(self.surface, [self.start, self.goal])
+
+    def __repr__(self) -> str:
+        name = f"{self.name}: " if self.name else ""
+        return f"Problem({name}{self.start} to {self.goal} within {self.bounds}; {self.surface!r})"
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A polyline of the plane, read as a curve on the surface above it.
+
+    points : (m, 2), map units, from start to goal.
+    """
+
+    surface: Surface
+    points: Array
+
+    @cached_property
+    def length(self) -> float:
+        """True length under h, map units, to 1e-9 relative."""
+        return metric.curve_length(self.surface, self.points)
+
+    @cached_property
+    def line(self) -> shapely.LineString:
+        """The path on the plane."""
+        return shapely.LineString(self.points)
+
+    @cached_property
+    def profile(self) -> Profile:
+        """The path sampled finely enough to see every feature of the surface."""
+        pieces = [self.points[:1]]
+        for a, b in zip(self.points[:-1], self.points[1:], strict=True):
+            finest = np.hypot(*(b - a)) / self.surface.resolution
+            count = max(PROFILE_POINTS, int(np.ceil(4.0 * finest)))
+            pieces.append(a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a))
+        points = np.concatenate(pieces)
+        steps = metric.segment_lengths(self.surface, points[:-1], points[1:])
+        distance = np.concatenate([[0.0], np.cumsum(steps)])
+        return Profile(points, distance, self.surface.values(points))
+
+    @cached_property
+    def climb(self) -> float:
+        """Sum of all rises of the first layer along the path, in its unit."""
+        rises = np.diff(self.profile.values[:, 0])
+        return float(rises[rises > 0.0].sum())
+
+
+class Profile(NamedTuple):
+    """What a traveller meets along a path."""
+
+    points: Array  # (m, 2), map units
+    distance: Array  # (m,) length from the start under h, map units
+    values: Array  # (m, layers), in the layers' units
+
+
+class Status(enum.Enum):
+    """How a planner ended. An unreachable goal is a result, not an error."""
+
+    SOLVED = "solved"
+    NOT_FOUND = "not-found"
+    UNREACHABLE = "unreachable"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def message(self) -> str:
+        """What it means and what to do about it."""
+        return _MESSAGES[self]
+
+
+_MESSAGES = {
+    Status.SOLVED: "a path was found",
+    Status.NOT_FOUND: "no path was found within the limits: the goal may be enclosed, or more "
+    "samples, a longer time limit or a smaller step may find one",
+    Status.UNREACHABLE: "no path exists: obstacles or no-data enclose the start or the goal",
+    Status.INTERRUPTED: "stopped by the user; the path, if any, is the best so far",
+}
+
+
+class History(NamedTuple):
+    """How the best cost fell, one entry a chunk of samples."""
+
+    samples: Array  # (k,)
+    seconds: Array  # (k,)
+    best_cost: Array  # (k,), map units, infinite before the first path
+
+
+class SearchTree(NamedTuple):
+    """The vertices of a tree planner."""
+
+    points: Array  # (n, 2), map units
+    parents: np.ndarray[Any, np.dtype[np.int32]]  # (n,), -1 at the start
+    costs: Array  # (n,), map units
+
+    @property
+    def segments(self) -> Array:
+        """(n - 1, 2, 2): each edge from parent to child."""
+        children = np.flatnonzero(self.parents >= 0)
+        return np.stack([self.points[self.parents[children]], self.points[children]], axis=1)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Solution:
+    """What a planner found.
+
+    Lengths are in map units. ``length`` is the true length of the path whatever the
+    planner optimised; ``cost`` is what the planner itself believed. ``path``, ``length``
+    and ``cost`` are None where no path was found, and so is a bound not asked for.
+    """
+
+    problem: Problem
+    planner: str
+    status: Status
+    path: Path | None
+    cost: float | None
+    seconds: float
+    samples: int = 0
+    seed: int | None = None
+    stopped_by: str = ""
+    lower_bound: float | None = None
+    history: History | None = None
+    tree: SearchTree | None = None
+    counters: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def length(self) -> float | None:
+        """True length of the path under h, to 1e-9 relative."""
+        return None if self.path is None else self.path.length
+
+    @property
+    def gap(self) -> float | None:
+        """(length - lower_bound) / lower_bound."""
+        if self.length is None or self.lower_bound is None:
+            return None
+        if self.length == self.lower_bound:
+            return 0.0
+        return (self.length - self.lower_bound) / self.lower_bound
+
+    def __repr__(self) -> str:
+        length = "no path" if self.length is None else f"length {self.length:.6f}"
+        return (
+            f"Solution({self.planner}: {self.status.value}, {length}, "
+            f"{self.samples} samples, {self.seconds:.3f} s)"
+        )

@@ -1,0 +1,6 @@
+"""Floor 1: surfaces. See ``surface.Surface``."""
+
+from .mask import Mask
+from .surface import Fit, Layer, Surface
+
+__all__ = ["Fit", "Layer", "Mask", "Surface"]

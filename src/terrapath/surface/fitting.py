@@ -1,0 +1,166 @@
+"""B-splines through grids and functions, with the error of the fit measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.stats import qmc
+
+from .._kernels.surfaces import Spline, fill_jets, fill_values
+from ..errors import FitError, InputError
+from ..validation import Array, Bounds
+from .mask import uniform_spacing
+
+Function = Callable[[Array, Array], Array]
+
+# From (x, y), arrays of one shape, to (2, layers, ...): d/dx1 and d/dx2.
+Gradient = Callable[[Array, Array], Array]
+
+FIRST_SAMPLES = 33  # a side, the coarsest grid that a function is tried on
+MOST_SAMPLES = 4097  # a side, the finest
+TEST_POINTS = 8192
+COARSE_TOLERANCE = 1e-3  # share of a layer's range that counts as "the shape is seen"
+MOST_RESAMPLING = 8  # how many times finer a non-uniform axis may become
+
+
+class FunctionFit(NamedTuple):
+    """A spline that follows a function."""
+
+    spline: Spline
+    samples: int  # a side
+    value_error: float  # largest found at points it was not fitted on
+    gradient_error: float
+    resolution: float  # map units: spacing that shows the function's shape
+
+
+def _coefficients(values: Array, spacing: float, axis: int) -> Array:
+    """Uniform cubic B-spline coefficients along one axis, two more than there are values.
+
+    The interpolating spline f is SciPy's, with not-a-knot ends. On uniform knots its
+    coefficients are c_j = f(x_j) - h^2/6 f''(x_j), and the outermost two follow from
+    f(x_j) = (c_(j-1) + 4 c_j + c_(j+1)) / 6.
+    """
+    f = np.moveaxis(values, axis, 0)
+    knots = spacing * np.arange(len(f))
+    inner = f - spacing**2 / 6.0 * CubicSpline(knots, f)(knots, 2)
+    first = 6.0 * f[0] - 4.0 * inner[0] - inner[1]
+    last = 6.0 * f[-1] - 4.0 * inner[-1] - inner[-2]
+    return np.moveaxis(np.concatenate([first[None], inner, last[None]]), 0, axis)
+
+
+def interpolate(values: Array, x: Array, y: Array, weights: Array) -> Spline:
+    """The bicubic spline through values (layers, ny, nx) on a uniform grid."""
+    dx, dy = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
+    coefficients = _coefficients(_coefficients(values, dx, 2), dy, 1)
+    return Spline(
+        np.ascontiguousarray(coefficients), weights, float(x[0]), float(y[0]), float(dx), float(dy)
+    )
+
+
+def _resample(values: Array, x: Array, axis: int) -> tuple[Array, Array]:
+    """Bring a non-uniform axis onto a uniform one as fine as its finest step."""
+    if uniform_spacing(x) is not None:
+        return values, x
+    count = int(np.ceil((x[-1] - x[0]) / np.diff(x).min())) + 1
+    if count > MOST_RESAMPLING * len(x):
+        raise InputError(
+            f"the grid's steps differ by a factor of over {MOST_RESAMPLING} "
+            f"({np.diff(x).min():g} to {np.diff(x).max():g}); resample it to equal steps first"
+        )
+    uniform = np.linspace(x[0], x[-1], count)
+    return CubicSpline(x, values, axis=axis)(uniform), uniform
+
+
+def fit_grid(values: Array, x: Array, y: Array, weights: Array) -> tuple[Spline, float]:
+    """The spline through values (layers, ny, nx), and its largest error at the samples."""
+    resampled, fine_x = _resample(values, x, 2)
+    resampled, fine_y = _resample(resampled, y, 1)
+    spline = interpolate(resampled, fine_x, fine_y, weights)
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    found = np.empty((len(points), len(values)))
+    fill_values(spline, points, found)
+    return spline, float(np.abs(found.T - values.reshape(len(values), -1)).max())
+
+
+def _checked(f: Function, x: Array, y: Array) -> Array:
+    """f(x, y) as (layers, ...), finite, or an error that names the place."""
+    values = np.asarray(f(x, y), dtype=np.float64)
+    if values.shape == x.shape:
+        values = values[None]
+    if values.ndim != x.ndim + 1 or values.shape[1:] != x.shape:
+        raise InputError(
+            f"f returned shape {values.shape} for arrays of shape {x.shape}; "
+            "it must return (layers, ...) on arrays"
+        )
+    if not np.isfinite(values).all():
+        place = tuple(np.argwhere(~np.isfinite(values))[0][1:])
+        raise InputError(
+            f"f is not finite at x1={x[place]:g}, x2={y[place]:g}; "
+            "shrink the bounds to where it is defined"
+        )
+    return values
+
+
+def _difference_gradient(f: Function, bounds: Bounds, step: float) -> Gradient:
+    """Sixth-order central differences of f."""
+    weights = {1: 3.0 / 4.0, 2: -3.0 / 20.0, 3: 1.0 / 60.0}
+
+    def gradient(x: Array, y: Array) -> Array:
+        along_x = sum(
+            w * (_checked(f, x + k * step, y) - _checked(f, x - k * step, y))
+            for k, w in weights.items()
+        )
+        along_y = sum(
+            w * (_checked(f, x, y + k * step) - _checked(f, x, y - k * step))
+            for k, w in weights.items()
+        )
+        return np.stack([along_x, along_y]) / step
+
+    return gradient
+
+
+def _test_points(bounds: Bounds, margin: float) -> tuple[Array, Array]:
+    """Points spread evenly (Sobol, scrambled, seed 0), off every grid, inside a margin."""
+    unit = qmc.Sobol(2, seed=0).random(TEST_POINTS)
+    x = bounds.x1_min + margin + unit[:, 0] * (bounds.width - 2.0 * margin)
+    y = bounds.x2_min + margin + unit[:, 1] * (bounds.height - 2.0 * margin)
+    return x, y
+
+
+def fit_function(
+    f: Function, bounds: Bounds, tolerance: float, gradient: Gradient | None
+) -> FunctionFit:
+    """Refine a grid until the spline's value and gradient follow f to the tolerance."""
+    resolution: float | None = None
+    samples = FIRST_SAMPLES
+    while True:
+        x = np.linspace(bounds.x1_min, bounds.x1_max, samples)
+        y = np.linspace(bounds.x2_min, bounds.x2_max, samples)
+        grid_x, grid_y = np.meshgrid(x, y)
+        values = _checked(f, grid_x, grid_y)
+        spline = interpolate(values, x, y, np.ones(len(values)))
+        step = min(spline.dx, spline.dy) / 4.0
+        slope = gradient or _difference_gradient(f, bounds, step)
+        px, py = _test_points(bounds, 0.0 if gradient else 3.0 * step)
+        jets = np.empty((TEST_POINTS, len(values), 6))
+        fill_jets(spline, np.column_stack([px, py]), jets)
+        value_error = np.abs(jets[..., 0].T - _checked(f, px, py)).max(axis=1)
+        gradient_error = float(np.abs(jets[..., 1:3].T - slope(px, py)).max())
+        spread = values.max(axis=(1, 2)) - values.min(axis=(1, 2))
+        if resolution is None and (value_error <= COARSE_TOLERANCE * spread).all():
+            resolution = max(spline.dx, spline.dy)
+        worst = float(value_error.max())
+        if max(worst, gradient_error) <= tolerance:
+            finest = max(spline.dx, spline.dy)
+            return FunctionFit(spline, samples, worst, gradient_error, resolution or finest)
+        if samples >= MOST_SAMPLES:
+            raise FitError(
+                f"tolerance={tolerance:g} is not met on {samples} x {samples} samples: "
+                f"the value is off by up to {worst:.2g}, the gradient by up to "
+                f"{gradient_error:.2g}; raise the tolerance, or smooth the function where it "
+                "has an edge"
+            )
+        samples = 2 * samples - 1

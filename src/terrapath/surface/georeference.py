@@ -1,0 +1,90 @@
+"""Where a planning plane lies on Earth, or on another body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError
+
+from ..errors import MapError
+from ..validation import Array
+
+
+def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
+    """Transverse Mercator in metres, true to scale at the given point of the same body.
+
+    Conformal, so directions and slopes are right, and unlike UTM without a scale factor:
+    30 km from the centre lengths are off by 1e-5.
+    """
+    ellipsoid = map_crs.ellipsoid
+    a, b = ellipsoid.semi_major_metre, ellipsoid.semi_minor_metre
+    datum = "+datum=WGS84" if map_crs.to_epsg() == 4326 else f"+a={a!r} +b={b!r}"
+    return CRS.from_proj4(
+        f"+proj=tmerc +lat_0={latitude:.6f} +lon_0={longitude:.6f} +k=1 +x_0=0 +y_0=0 "
+        f"{datum} +units=m +no_defs"
+    )
+
+
+@dataclass(frozen=True)
+class Georeference:
+    """The CRS that is planned in, and the CRS that the map came in."""
+
+    crs: CRS
+    map_crs: CRS
+
+    @classmethod
+    def from_projected(cls, crs: Any) -> Georeference:
+        """A map that is planned in its own, projected CRS."""
+        try:
+            parsed = CRS.from_user_input(crs)
+        except CRSError as error:
+            raise MapError(f"crs={crs!r} is not understood: {error}") from None
+        return cls(parsed, parsed)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the plane."""
+        name = self.crs.axis_info[0].unit_name if self.crs.axis_info else ""
+        return {"metre": "m", "kilometre": "km", "foot": "ft", "US survey foot": "ft"}.get(
+            name, name
+        )
+
+    @property
+    def is_earth(self) -> bool:
+        """Is the body Earth? Its radius tells."""
+        radius = self.crs.ellipsoid.semi_major_metre if self.crs.ellipsoid else 0.0
+        return bool(6.3e6 < radius < 6.4e6)
+
+    @property
+    def name(self) -> str:
+        """What the plane is, for people."""
+        if self.crs == self.map_crs:
+            return str(self.crs.name)
+        return f"local transverse Mercator of {self.map_crs.name}"
+
+    @cached_property
+    def _to_map(self) -> Transformer:
+        return Transformer.from_crs(self.crs, self.map_crs, always_xy=True)
+
+    @cached_property
+    def _to_lonlat(self) -> Transformer:
+        target = CRS.from_epsg(4326) if self.is_earth else self.crs.geodetic_crs
+        return Transformer.from_crs(self.crs, target, always_xy=True)
+
+    def to_map(self, points: Array) -> Array:
+        """Plane (..., 2) -> the map's own coordinates, x (longitude) before y (latitude)."""
+        return np.stack(self._to_map.transform(points[..., 0], points[..., 1]), axis=-1)
+
+    def from_map(self, points: Array) -> Array:
+        """The map's own coordinates (..., 2) -> the plane."""
+        return np.stack(
+            self._to_map.transform(points[..., 0], points[..., 1], direction="INVERSE"), axis=-1
+        )
+
+    def to_lonlat(self, points: Array) -> Array:
+        """Plane (..., 2) -> longitude and latitude in degrees: WGS 84 on Earth."""
+        return np.stack(self._to_lonlat.transform(points[..., 0], points[..., 1]), axis=-1)

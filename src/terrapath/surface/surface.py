@@ -1,0 +1,292 @@
+"""The surface that a robot moves on, as data that kernels understand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .._kernels.surfaces import Peaks, Spline, fill_jets, fill_values
+from ..errors import InputError, OutsideSurfaceError
+from ..validation import (
+    Array,
+    Bounds,
+    as_array,
+    as_bounds,
+    as_points,
+    require_not_negative,
+    require_positive,
+)
+from .fitting import Gradient, fit_function, fit_grid
+from .georeference import Georeference
+from .mask import Mask
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One scalar field over the plane.
+
+    The weight multiplies the layer where it becomes a coordinate of R^n: a change of
+    one unit of the layer counts as ``weight`` map units of way.
+    """
+
+    name: str
+    unit: str = ""
+    weight: float = 1.0
+
+    def __str__(self) -> str:
+        unit = f" [{self.unit}]" if self.unit else ""
+        weight = f" x {self.weight:g}" if self.weight != 1.0 else ""
+        return f"{self.name}{unit}{weight}"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a surface was made, and the largest error that was found."""
+
+    method: str
+    value_error: float  # in the layers' units
+    gradient_error: float | None = None  # layer units a map unit; None where not measured
+
+    def __str__(self) -> str:
+        text = f"{self.method}; value error {self.value_error:.2g}"
+        if self.gradient_error is not None:
+            text += f", gradient error {self.gradient_error:.2g}"
+        return text
+
+
+EXACT = Fit("exact Gaussian peaks", 0.0, 0.0)
+
+
+def _make_layers(
+    count: int,
+    names: Sequence[str] | None,
+    units: Sequence[str] | None,
+    weights: Sequence[float] | None,
+) -> tuple[Layer, ...]:
+    """Layers with defaults: the first is the height, the others are numbered as x_k."""
+    names = names or ["height", *(f"x{k}" for k in range(4, count + 3))]
+    units = units or [""] * count
+    weights = weights or [1.0] * count
+    for what, given in (("names", names), ("units", units), ("weights", weights)):
+        if len(given) != count:
+            raise InputError(f"{what} has {len(given)} entries for {count} layers; give one each")
+    if len(set(names)) != count:
+        raise InputError(f"names={list(names)} repeats a name; layers need distinct names")
+    for name, weight in zip(names, weights, strict=True):
+        require_not_negative(**{f"the weight of {name}": weight})
+    return tuple(
+        Layer(str(n), str(u), float(w)) for n, u, w in zip(names, units, weights, strict=True)
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Surface:
+    """The graph s(x1, x2) = (x1, x2, x3, ..., xn) of n - 2 layers over the plane.
+
+    Make one with ``from_peaks``, ``from_grid``, ``from_function`` or
+    ``from_expression``. The error of the fit is part of it, in ``fit``.
+    """
+
+    data: Peaks | Spline
+    layers: tuple[Layer, ...]
+    bounds: Bounds | None  # where it is defined; None: everywhere
+    fit: Fit
+    resolution: float  # map units: the size of the smallest features
+    nodata: Mask | None = None
+    georeference: Georeference | None = None
+
+    # Making one
+
+    @classmethod
+    def from_peaks(
+        cls,
+        layers: Sequence[Sequence[Sequence[float]]],
+        *,
+        names: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        weights: Sequence[float] | None = None,
+    ) -> Surface:
+        """Layers that are sums of Gaussian peaks, exact everywhere.
+
+        layers : for each layer its peaks (amplitude, falloff, x1, x2), each the function
+        amplitude * exp(-falloff * r^2); amplitude in the layer's unit, falloff > 0 in
+        1/map unit^2. Source: the surfaces of the paper's section 5.
+        """
+        if len(layers) == 0:
+            raise InputError("layers is empty; a surface needs at least one layer")
+        rows = [as_array(peaks, f"layers[{k}]", shape=(None, 4)) for k, peaks in enumerate(layers)]
+        peaks = np.concatenate(rows)
+        if len(peaks) and peaks[:, 1].min() <= 0.0:
+            raise InputError(
+                f"falloff={peaks[:, 1].min():g} must be above 0; a peak is "
+                "(amplitude, falloff, x1, x2) with the value amplitude * exp(-falloff * r^2)"
+            )
+        made = _make_layers(len(layers), names, units, weights)
+        first = np.cumsum([0, *(len(row) for row in rows)]).astype(np.int64)
+        # Half of the standard deviation of the sharpest peak.
+        resolution = math.inf if len(peaks) == 0 else 0.5 / math.sqrt(2.0 * peaks[:, 1].max())
+        data = Peaks(peaks, first, np.array([layer.weight for layer in made]))
+        return cls(data, made, None, EXACT, resolution)
+
+    @classmethod
+    def from_grid(
+        cls,
+        values: Any,
+        x: Any,
+        y: Any,
+        *,
+        names: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        weights: Sequence[float] | None = None,
+        nodata: Mask | None = None,
+        georeference: Georeference | None = None,
+    ) -> Surface:
+        """The bicubic spline through samples on a grid.
+
+        values : (layers, ny, nx), or (ny, nx) for one layer, in the layers' units; finite,
+        at least 4 x 4. x : (nx,), y : (ny,) increasing, map units; where the steps are not
+        equal, the grid is resampled and the error at the samples reported in ``fit``.
+        """
+        array = np.asarray(values)
+        if array.ndim == 2:
+            array = array[None]
+        x, y = as_array(x, "x", shape=(None,)), as_array(y, "y", shape=(None,))
+        if len(x) < 4 or len(y) < 4:
+            raise InputError(
+                f"the grid has {len(x)} x {len(y)} samples; a surface needs at least 4 x 4"
+            )
+        for name, axis in (("x", x), ("y", y)):
+            if not (np.diff(axis) > 0.0).all():
+                raise InputError(f"{name} does not increase; flip it, and the values with it")
+        array = as_array(array, "values", shape=(None, len(y), len(x)))
+        made = _make_layers(len(array), names, units, weights)
+        spline, error = fit_grid(array, x, y, np.array([layer.weight for layer in made]))
+        fit = Fit(f"bicubic spline through {len(x)} x {len(y)} samples", error)
+        bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
+        resolution = max(np.diff(x).max(), np.diff(y).max())
+        return cls(spline, made, bounds, fit, float(resolution), nodata, georeference)
+
+    @classmethod
+    def from_function(
+        cls,
+        f: Callable[[Array, Array], Any],
+        bounds: Any,
+        tolerance: float = 1e-6,
+        *,
+        gradient: Gradient | None = None,
+        names: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        weights: Sequence[float] | None = None,
+    ) -> Surface:
+        """A spline that follows f, refined until it meets the tolerance.
+
+        f(x, y) -> (layers, ...) on arrays. tolerance : the largest error of a value (layer
+        unit) and of a gradient (layer unit/map unit) at points that the spline was not
+        fitted on. gradient(x, y) -> (2, layers, ...), if known; otherwise differences of f.
+        Raises FitError where f is not smooth enough for it.
+        """
+        require_positive(tolerance=tolerance)
+        rectangle = as_bounds(bounds)
+        found = fit_function(f, rectangle, tolerance, gradient)
+        made = _make_layers(len(found.spline.weights), names, units, weights)
+        fit = Fit(
+            f"bicubic spline of a function, {found.samples} x {found.samples} samples",
+            found.value_error,
+            found.gradient_error,
+        )
+        surface = cls(found.spline, made, rectangle, fit, found.resolution)
+        return surface.with_weights({layer.name: layer.weight for layer in made})
+
+    @classmethod
+    def from_expression(
+        cls,
+        expressions: str | Sequence[str],
+        bounds: Any,
+        tolerance: float = 1e-6,
+        *,
+        names: Sequence[str] | None = None,
+        units: Sequence[str] | None = None,
+        weights: Sequence[float] | None = None,
+    ) -> Surface:
+        """As ``from_function``, for SymPy expressions in x1 and x2, one a layer.
+
+        The gradients that the fit is checked against are exact.
+        """
+        from .expressions import compile_expressions
+
+        listed = [expressions] if isinstance(expressions, str) else list(expressions)
+        function, gradient = compile_expressions(listed)
+        return cls.from_function(
+            function,
+            bounds,
+            tolerance,
+            gradient=gradient,
+            names=names,
+            units=units,
+            weights=weights,
+        )
+
+    def with_weights(self, weights: Mapping[str, float]) -> Surface:
+        """The same surface with the weights of some layers changed."""
+        known = {layer.name for layer in self.layers}
+        for name, weight in weights.items():
+            if name not in known:
+                raise InputError(f"layer {name!r} is not known; there are {sorted(known)}")
+            require_not_negative(**{f"the weight of {name}": weight})
+        layers = tuple(
+            replace(layer, weight=float(weights.get(layer.name, layer.weight)))
+            for layer in self.layers
+        )
+        data = self.data._replace(weights=np.array([layer.weight for layer in layers]))
+        return replace(self, data=data, layers=layers)
+
+    # Looking at it
+
+    @property
+    def unit(self) -> str:
+        """Unit of lengths on the plane; empty where it is not known."""
+        return "" if self.georeference is None else self.georeference.unit
+
+    def _points(self, points: Any) -> tuple[Array, tuple[int, ...]]:
+        array = as_points(points)
+        if self.bounds is not None and not (inside := self.bounds.contains(array)).all():
+            x, y = array[~inside][0]
+            raise OutsideSurfaceError(
+                f"({x:.10g}, {y:.10g}) is outside the surface, {self.bounds}; "
+                "check the axis order or the CRS"
+            )
+        return np.ascontiguousarray(array.reshape(-1, 2)), array.shape[:-1]
+
+    def _jets(self, points: Any) -> Array:
+        flat, shape = self._points(points)
+        jets = np.empty((len(flat), len(self.layers), 6))
+        fill_jets(self.data, flat, jets)
+        return jets.reshape(*shape, len(self.layers), 6)
+
+    def values(self, points: Any) -> Array:
+        """points (..., 2), map units -> (..., layers), in the layers' units."""
+        flat, shape = self._points(points)
+        values = np.empty((len(flat), len(self.layers)))
+        fill_values(self.data, flat, values)
+        return values.reshape(*shape, len(self.layers))
+
+    def gradients(self, points: Any) -> Array:
+        """points (..., 2) -> (..., layers, 2), layer units/map unit."""
+        return self._jets(points)[..., 1:3]
+
+    def hessians(self, points: Any) -> Array:
+        """points (..., 2) -> (..., layers, 2, 2), layer units/map unit^2."""
+        return self._jets(points)[..., [[3, 4], [4, 5]]]
+
+    def lift(self, points: Any) -> Array:
+        """points (..., 2) -> (..., n): the points of R^n above them, layers weighted."""
+        array = as_points(points)
+        return np.concatenate([array, self.values(array) * self.data.weights], axis=-1)
+
+    def __repr__(self) -> str:
+        domain = "the whole plane" if self.bounds is None else str(self.bounds)
+        return f"Surface({', '.join(map(str, self.layers))}; {domain}; {self.fit})"
