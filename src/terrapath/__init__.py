@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from .problem import Path, Problem, Solution, Status
     from .surface import Layer, Mask, Surface
 
-_MODULES = ("metric", "scenes")
-_NAMES = {
+# Each name of the public face, and the module it lives in.
+_HOMES = {
     "FitError": "errors",
     "InputError": "errors",
     "MapError": "errors",
@@ -51,16 +51,45 @@ _NAMES = {
     "Surface": "surface",
 }
 
-__all__ = ["__version__", *_MODULES, *_NAMES]
+__all__ = [
+    "RRT",
+    "Circle",
+    "FitError",
+    "FreeSpace",
+    "InputError",
+    "Layer",
+    "LayerSource",
+    "MapError",
+    "Mask",
+    "OutsideSurfaceError",
+    "Path",
+    "Problem",
+    "Progress",
+    "RRTStar",
+    "Solution",
+    "Status",
+    "Surface",
+    "TerrapathError",
+    "__version__",
+    "chord",
+    "curve_length",
+    "line_r",
+    "metric",
+    "plan",
+    "plot_route",
+    "read_surface",
+    "scenes",
+    "write_route",
+]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
+    if name in _HOMES:
+        return getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+    if name in __all__:
         return importlib.import_module(f".{name}", __name__)
-    if name in _NAMES:
-        return getattr(importlib.import_module(f".{_NAMES[name]}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__

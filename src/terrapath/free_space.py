@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -35,10 +36,12 @@ class Circle:
             raise InputError(f"the centre ({self.x1}, {self.x2}) of a circle is not finite")
 
     def covers(self, x1: float, x2: float) -> bool:
+        """Does the point lie in the disc?"""
         return math.hypot(x1 - self.x1, x2 - self.x2) <= self.radius
 
 
-Obstacle = BaseGeometry | Circle | Mask
+Obstacle: TypeAlias = BaseGeometry | Circle | Mask
+Indices: TypeAlias = npt.NDArray[np.int64]
 
 
 def _parts(obstacle: BaseGeometry, index: int) -> Iterator[BaseGeometry]:
@@ -71,7 +74,7 @@ def _edges(geometry: BaseGeometry) -> Array:
     return np.concatenate([np.hstack([ring[:-1], ring[1:]]) for ring in coordinates])
 
 
-def _lists(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Array, Array]:
+def _lists(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
     """Which items each cell of the grid holds: (first, ids) as in ``Space``."""
     counts = np.zeros(grid.nx * grid.ny + 1, np.int64)
     lister(grid, items, counts, np.empty(0, np.int64))
@@ -146,7 +149,7 @@ class FreeSpace:
             return "in a blocked or no-data cell"
         return None
 
-    def segments_are_free(self, a: Any, b: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def segments_are_free(self, a: Any, b: Any) -> npt.NDArray[np.bool_]:
         """Do the closed segments a-b, each (m, 2), touch nothing? One end must be free.
 
         In doubt, within rounding of a touch, the answer is no.

@@ -17,7 +17,7 @@ QUADRATURE_TOLERANCE = 1e-12
 
 
 def metric_tensor(surface: Surface, points: Any) -> Array:
-    """h = I + sum_k w_k^2 grad x_k grad x_k^T.
+    """H = I + sum_k w_k^2 grad x_k grad x_k^T.
 
     points : (..., 2), map units. Returns (..., 2, 2), without unit.
     Raises OutsideSurfaceError where a point is off the surface. Source: paper, section 3.2.
@@ -29,7 +29,7 @@ def metric_tensor(surface: Surface, points: Any) -> Array:
 
 
 def determinant(surface: Surface, points: Any) -> Array:
-    """d = det h, the squared ratio of area on the surface to area on the plane.
+    """D = det h, the squared ratio of area on the surface to area on the plane.
 
     points : (..., 2), map units. Returns (...). Source: paper, section 3.2.
     """

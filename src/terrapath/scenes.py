@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def _load_jacksboro() -> Problem:
 
     from .surface.raster import Raster
 
-    with get_sample_data("jacksboro_fault_dem.npz") as archive:
+    with cast("Any", get_sample_data("jacksboro_fault_dem.npz")) as archive:
         heights = archive["elevation"].astype(np.float64)
         # The file names the northern edge ymin: its rows run from north to south.
         west, east, north, south = (float(archive[k]) for k in ("xmin", "xmax", "ymin", "ymax"))

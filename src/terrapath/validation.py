@@ -24,19 +24,22 @@ class Bounds(NamedTuple):
 
     @property
     def width(self) -> float:
+        """Extent along x1, map units."""
         return self.x1_max - self.x1_min
 
     @property
     def height(self) -> float:
+        """Extent along x2, map units."""
         return self.x2_max - self.x2_min
 
     def contains(self, points: Array) -> npt.NDArray[np.bool_]:
-        """points (..., 2) -> (...) bool."""
+        """Points (..., 2) -> (...) bool."""
         x, y = points[..., 0], points[..., 1]
         inside = (x >= self.x1_min) & (x <= self.x1_max) & (y >= self.x2_min) & (y <= self.x2_max)
         return np.asarray(inside)
 
     def encloses(self, other: Bounds) -> bool:
+        """Does the other rectangle lie wholly in this one?"""
         return bool(self.contains(np.array([other[:2], other[2:]])).all())
 
     def __str__(self) -> str:
@@ -87,8 +90,13 @@ def as_array(values: Any, name: str, *, shape: tuple[int | None, ...]) -> Array:
 
 def as_point(value: Any, name: str) -> tuple[float, float]:
     """One finite point of the plane."""
-    x, y = as_array(value, name, shape=(2,))
-    return float(x), float(y)
+    try:
+        x, y = (float(coordinate) for coordinate in value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}={value!r} is not a point; give (x1, x2), two numbers") from None
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise InputError(f"{name}=({x:g}, {y:g}) is not finite; give two finite numbers")
+    return x, y
 
 
 def as_points(points: Any, name: str = "points") -> Array:
@@ -106,6 +114,10 @@ def _describe(value: Any) -> str:
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def _is_whole(value: Any) -> bool:
+    return _is_number(value) and isinstance(value, numbers.Integral)
 
 
 def require_positive(**values: Any) -> None:
@@ -132,13 +144,13 @@ def require_fraction(**values: Any) -> None:
 def require_count(most: int = 2**31 - 3, **values: Any) -> None:
     """Each value is an integer from 1 to ``most``."""
     for name, value in values.items():
-        if not (_is_number(value) and isinstance(value, numbers.Integral) and 1 <= value <= most):
+        if not (_is_whole(value) and 1 <= value <= most):
             raise InputError(f"{name}={_describe(value)} must be a whole number from 1 to {most:,}")
 
 
 def require_seed(seed: Any) -> None:
     """A seed is an integer, 0 or above."""
-    if not (_is_number(seed) and isinstance(seed, numbers.Integral) and seed >= 0):
+    if not (_is_whole(seed) and seed >= 0):
         raise InputError(f"seed={_describe(seed)} must be a whole number, 0 or above")
 
 

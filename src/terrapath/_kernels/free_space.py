@@ -58,8 +58,8 @@ _MARGIN = 1e-7
 @kernel
 def span(low, high, origin, size, count):
     """Cells of one axis that [low, high] touches, limited to the grid."""
-    first = int(math.floor((low - origin) / size - _MARGIN))
-    last = int(math.floor((high - origin) / size + _MARGIN))
+    first = math.floor((low - origin) / size - _MARGIN)
+    last = math.floor((high - origin) / size + _MARGIN)
     return Span(max(first, 0), min(last, count - 1))
 
 

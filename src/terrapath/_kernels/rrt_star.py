@@ -108,7 +108,7 @@ def edge_length(surface, vertices, a, b, panel):
     """Length of the edge between two vertices by Line-R, in panels."""
     p, q = vertices[a], vertices[b]
     hp, hq = Metric(p.h11, p.h12, p.h22), Metric(q.h11, q.h12, q.h22)
-    panels = max(int(math.ceil(math.hypot(q.x - p.x, q.y - p.y) / panel)), 1)
+    panels = max(math.ceil(math.hypot(q.x - p.x, q.y - p.y) / panel), 1)
     return composite_boole(surface, p.x, p.y, hp, q.x, q.y, hq, panels)
 
 
@@ -360,13 +360,9 @@ def point_of_ellipse(tree, options, u, v):
     longest = tree.vertices[tree.counters[GOAL]].cost
     ax, ay = tree.vertices[0].x, tree.vertices[0].y
     focal = distance_to_goal(tree, options, 0)
-    across = (
-        0.5
-        * math.sqrt(u)
-        * math.sqrt(max(longest**2 - focal**2, 0.0))
-        * math.sin(2.0 * math.pi * v)
-    )
-    along = 0.5 * math.sqrt(u) * longest * math.cos(2.0 * math.pi * v)
+    width = math.sqrt(max(longest**2 - focal**2, 0.0))
+    along = 0.5 * longest * math.sqrt(u) * math.cos(2.0 * math.pi * v)
+    across = 0.5 * width * math.sqrt(u) * math.sin(2.0 * math.pi * v)
     ex, ey = (options.goal_x - ax) / focal, (options.goal_y - ay) / focal
     x = 0.5 * (ax + options.goal_x) + along * ex - across * ey
     y = 0.5 * (ay + options.goal_y) + along * ey + across * ex
@@ -414,9 +410,9 @@ def grow(surface, space, tree, options, draws):
     for m in range(draws.shape[0]):
         tree.counters[SAMPLES] += 1
         x, y, worthwhile = sample(surface, tree, options, draws[m])
-        if worthwhile and extend(surface, space, tree, options, x, y):
-            if tree.counters[GOAL] < 0:
-                join_goal(surface, space, tree, options)
+        grew = worthwhile and extend(surface, space, tree, options, x, y)
+        if grew and tree.counters[GOAL] < 0:
+            join_goal(surface, space, tree, options)
 
 
 @kernel

@@ -116,8 +116,8 @@ def spline_cell(surface, x, y):
     """The cell of (x, y), clamped to the outermost cells."""
     s = (x - surface.x0) / surface.dx
     t = (y - surface.y0) / surface.dy
-    i = min(max(int(math.floor(s)), 0), surface.coefficients.shape[2] - 4)
-    j = min(max(int(math.floor(t)), 0), surface.coefficients.shape[1] - 4)
+    i = min(max(math.floor(s), 0), surface.coefficients.shape[2] - 4)
+    j = min(max(math.floor(t), 0), surface.coefficients.shape[1] - 4)
     return Cell(i, j, s - i, t - j)
 
 
@@ -222,7 +222,7 @@ def jet_at(surface, layer, x, y):
 
 @per_class({Peaks: peaks_metric, Spline: spline_metric})
 def metric_at(surface, x, y):
-    """h = I + sum_k w_k^2 grad x_k grad x_k^T (paper, section 3.2)."""
+    """H = I + sum_k w_k^2 grad x_k grad x_k^T (paper, section 3.2)."""
 
 
 # Many points at once: points (m, 2); results are filled in

@@ -1,1 +1,5 @@
 """Floor 8: the ``terrapath`` command."""
+
+from .main import main
+
+__all__ = ["main"]

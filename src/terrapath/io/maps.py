@@ -56,8 +56,9 @@ class LayerSource:
 
 
 def _damaged(path: Path, error: Exception) -> MapError:
-    reason = str(error).split("\n")[0]
-    return MapError(f"{path} cannot be read as a raster: {reason}; check that it is whole")
+    # Rasterio puts the reason into the cause: its own message only points there.
+    reason = str(error.__cause__ or error).split("\n")[0].rstrip(".")
+    return MapError(f"{path} cannot be read as a raster: {reason}; check that it is one, and whole")
 
 
 def _read_band(source: LayerSource) -> tuple[Raster, str]:

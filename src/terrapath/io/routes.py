@@ -13,9 +13,9 @@ import numpy as np
 
 from .. import __version__
 from ..errors import MapError
+from ..files import written_whole
 from ..problem import Problem, Solution
 from ..validation import Array
-from .files import written_whole
 
 
 def _finite(value: float | None) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 from collections.abc import Callable
 from functools import partial
@@ -20,11 +21,13 @@ PLANNERS: dict[str, Callable[..., Planner]] = {
 }
 
 
-def _fields(factory: Callable[..., Planner]) -> dict[str, Any]:
-    kind = factory.func if isinstance(factory, partial) else factory
-    fields: dict[str, Any] = kind.__dataclass_fields__  # type: ignore[attr-defined]
-    fixed = factory.keywords if isinstance(factory, partial) else {}
-    return {name: field for name, field in fields.items() if name not in fixed}
+def _options(factory: Callable[..., Planner]) -> list[str]:
+    """Names of the options of a planner that its registered name leaves open."""
+    kind: Any = factory
+    fixed: dict[str, Any] = {}
+    if isinstance(factory, partial):
+        kind, fixed = factory.func, factory.keywords
+    return [field.name for field in dataclasses.fields(kind) if field.name not in fixed]
 
 
 def make_planner(name: str, **options: Any) -> Planner:
@@ -34,7 +37,7 @@ def make_planner(name: str, **options: Any) -> Planner:
     """
     if name not in PLANNERS:
         raise InputError(f"planner={name!r} is not known; choose one of {', '.join(PLANNERS)}")
-    known = _fields(PLANNERS[name])
+    known = _options(PLANNERS[name])
     for option in options:
         if option not in known:
             near = difflib.get_close_matches(option, known, n=1)

@@ -100,7 +100,7 @@ class _Search:
 
     @property
     def best_cost(self) -> float:
-        return float(self.tree.vertices[self.goal].cost) if self.goal >= 0 else math.inf
+        return float(self.tree.vertices[self.goal]["cost"]) if self.goal >= 0 else math.inf
 
     @property
     def samples(self) -> int:
@@ -156,14 +156,15 @@ def _path(problem: Problem, tree: kernels.Tree) -> Path | None:
     points = []
     while vertex >= 0:
         row = tree.vertices[vertex]
-        points.append((row.x, row.y))
-        vertex = int(row.parent)
+        points.append((row["x"], row["y"]))
+        vertex = int(row["parent"])
     return problem.path(points[::-1])
 
 
 def _search_tree(tree: kernels.Tree) -> SearchTree:
     rows = tree.vertices[: tree.counters[kernels.VERTICES]]
-    return SearchTree(np.column_stack([rows.x, rows.y]), rows.parent.copy(), rows.cost.copy())
+    points = np.column_stack([rows["x"], rows["y"]])
+    return SearchTree(points, rows["parent"].copy(), rows["cost"].copy())
 
 
 def _counters(tree: kernels.Tree) -> dict[str, int]:

@@ -21,6 +21,8 @@ def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
     30 km from the centre lengths are off by 1e-5.
     """
     ellipsoid = map_crs.ellipsoid
+    if ellipsoid is None:
+        raise MapError(f"the CRS {map_crs.name!r} has no ellipsoid; assign a geographic CRS")
     a, b = ellipsoid.semi_major_metre, ellipsoid.semi_minor_metre
     datum = "+datum=WGS84" if map_crs.to_epsg() == 4326 else f"+a={a!r} +b={b!r}"
     return CRS.from_proj4(

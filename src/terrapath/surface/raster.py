@@ -95,10 +95,10 @@ class Raster:
 
     def _trimmed(self) -> Raster:
         """Without outer rows and columns that hold no data at all."""
-        some = np.isfinite(self.bands).all(axis=0)
-        if not some.any():
+        some = np.all(np.isfinite(self.bands), axis=0)
+        if not np.any(some):
             return self
-        rows, columns = np.flatnonzero(some.any(axis=1)), np.flatnonzero(some.any(axis=0))
+        rows, columns = (np.flatnonzero(np.any(some, axis=axis)) for axis in (1, 0))
         window = np.s_[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         transform = self.transform @ Affine.translation(columns[0], rows[0])
         return Raster(self.bands[window], transform, self.crs, self.map_crs)
@@ -109,7 +109,9 @@ class Raster:
     def _centres(self) -> tuple[Array, Array]:
         rows, columns = self.bands.shape[1:]
         t = self.transform
-        return t.c + t.a * (np.arange(columns) + 0.5), t.f + t.e * (np.arange(rows) + 0.5)
+        x: Array = t.c + t.a * (np.arange(columns, dtype=np.float64) + 0.5)
+        y: Array = t.f + t.e * (np.arange(rows, dtype=np.float64) + 0.5)
+        return x, y
 
     def to_surface(
         self,
@@ -128,7 +130,7 @@ class Raster:
                 f"the map has {bands.shape[2]} x {bands.shape[1]} cells; "
                 f"a surface needs at least {LEAST_CELLS} x {LEAST_CELLS}"
             )
-        missing = ~np.isfinite(bands).all(axis=0)
+        missing: npt.NDArray[np.bool_] = np.any(~np.isfinite(bands), axis=0)
         if missing.all():
             raise MapError("the map holds no data at all: every cell is no-data")
         return Surface.from_grid(

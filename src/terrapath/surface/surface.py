@@ -268,22 +268,22 @@ class Surface:
         return jets.reshape(*shape, len(self.layers), 6)
 
     def values(self, points: Any) -> Array:
-        """points (..., 2), map units -> (..., layers), in the layers' units."""
+        """Points (..., 2), map units -> (..., layers), in the layers' units."""
         flat, shape = self._points(points)
         values = np.empty((len(flat), len(self.layers)))
         fill_values(self.data, flat, values)
         return values.reshape(*shape, len(self.layers))
 
     def gradients(self, points: Any) -> Array:
-        """points (..., 2) -> (..., layers, 2), layer units/map unit."""
+        """Points (..., 2) -> (..., layers, 2), layer units/map unit."""
         return self._jets(points)[..., 1:3]
 
     def hessians(self, points: Any) -> Array:
-        """points (..., 2) -> (..., layers, 2, 2), layer units/map unit^2."""
+        """Points (..., 2) -> (..., layers, 2, 2), layer units/map unit^2."""
         return self._jets(points)[..., [[3, 4], [4, 5]]]
 
     def lift(self, points: Any) -> Array:
-        """points (..., 2) -> (..., n): the points of R^n above them, layers weighted."""
+        """Points (..., 2) -> (..., n): the points of R^n above them, layers weighted."""
         array = as_points(points)
         return np.concatenate([array, self.values(array) * self.data.weights], axis=-1)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import MapError
+from .errors import MapError
 
 
 def require_writable(path: Path) -> None:
@@ -35,9 +35,13 @@ def written_whole(path: Path) -> Iterator[Path]:
     os.close(handle)
     temporary = Path(name)
     try:
-        yield temporary
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        try:
+            yield temporary
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise MapError(f"{path} could not be written: {reason}") from None
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -1,0 +1,78 @@
+"""The command's entry point: its sub-commands, and errors as one line and an exit code."""
+
+from __future__ import annotations
+
+import enum
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from .. import __version__
+from ..errors import TerrapathError
+from .plan import plan_command
+from .scenes import scenes_command
+
+# Typer brings its own copy of Click, or uses the installed one, by version; the base of
+# its usage errors is reached through the one it exports.
+UsageError: Any = typer.BadParameter.__mro__[1]
+
+
+class ExitCode(enum.IntEnum):
+    """What the command's exit code means."""
+
+    SOLVED = 0
+    BAD_INPUT = 2
+    NOT_FOUND = 3
+    UNREACHABLE = 4
+    INTERRUPTED = 130
+
+
+app = typer.Typer(
+    help="Optimal paths on terrain, with proof.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("plan")(plan_command)
+app.command("scenes")(scenes_command)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"terrapath {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show it.")
+    ] = False,
+) -> None:
+    pass
+
+
+def _fail(message: str) -> int:
+    """One line on standard error."""
+    print("terrapath:", " ".join(message.split()), file=sys.stderr)
+    return ExitCode.BAD_INPUT
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run the command and return its exit code; no error escapes as a traceback."""
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        return app(given or ["--help"], standalone_mode=False) or ExitCode.SOLVED
+    except UsageError as error:
+        return _fail(error.format_message())
+    except TerrapathError as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        return ExitCode.INTERRUPTED
+
+
+def main() -> None:
+    """Entry point of the ``terrapath`` script."""
+    sys.exit(run())

@@ -1,0 +1,106 @@
+"""The plane from above: shaded map, contours, obstacles, tree and path."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.patches import Circle as Disc
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from shapely import LineString, Polygon
+
+from ..problem import Problem, Solution
+from .terrain import LAYER_COLOURS, Terrain, height_colours, label_axes
+
+SAMPLES = 500
+CONTOURS = 14
+LAYER_CONTOURS = 5
+PATH_COLOUR = "#e4002b"
+OBSTACLE_STYLE: dict[str, Any] = {"facecolor": "#3b3b3b", "edgecolor": "black", "linewidth": 0.8}
+
+
+def _outline(polygon: Polygon) -> PathPatch:
+    rings = [polygon.exterior, *polygon.interiors]
+    paths = [Outline(np.asarray(ring.coords), closed=True) for ring in rings]
+    return PathPatch(Outline.make_compound_path(*paths))
+
+
+def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain) -> None:
+    """Polygons, discs, walls and blocked cells."""
+    space = problem.free_space
+    patches = [_outline(g) for g in space.geometries if isinstance(g, Polygon)]
+    discs = [Disc((c.x1, c.x2), c.radius) for c in space.circles]
+    axes.add_collection(PatchCollection([*patches, *discs], zorder=3, **OBSTACLE_STYLE))
+    walls = [np.asarray(g.coords) for g in space.geometries if isinstance(g, LineString)]
+    axes.add_collection(LineCollection(walls, colors="black", linewidths=2.0, zorder=3))
+    if terrain.blocked.any():
+        shown = np.where(terrain.blocked[..., None], [0.23, 0.23, 0.23, 0.9], 0.0)
+        axes.imshow(shown, extent=_extent(problem), origin="lower", zorder=3)
+
+
+def _extent(problem: Problem) -> tuple[float, float, float, float]:
+    b = problem.bounds
+    return b.x1_min, b.x1_max, b.x2_min, b.x2_max
+
+
+def _draw_contours(axes: Any, terrain: Terrain) -> None:
+    """Heights in black, the second layer, where there is one, in its colours."""
+    heights, *others = terrain.values
+    if np.ptp(heights) > 0.0:
+        style = {"colors": "black", "linewidths": 0.45, "alpha": 0.45}
+        axes.contour(terrain.x, terrain.y, heights, CONTOURS, **style)
+    if others and np.ptp(others[0]) > 0.0:
+        style = {"cmap": LAYER_COLOURS, "linewidths": 0.8, "alpha": 0.9}
+        axes.contour(terrain.x, terrain.y, others[0], LAYER_CONTOURS, **style)
+
+
+def _draw_tree(axes: Any, solution: Solution) -> None:
+    if solution.tree is None:
+        return
+    segments = solution.tree.segments
+    opacity = float(np.clip(2000.0 / (len(segments) + 1), 0.14, 0.6))
+    axes.add_collection(
+        LineCollection(list(segments), colors="black", linewidths=0.35, alpha=opacity, zorder=2)
+    )
+
+
+def _draw_path(axes: Any, solution: Solution) -> None:
+    problem = solution.problem
+    halo = [patheffects.withStroke(linewidth=4.6, foreground="white")]
+    if solution.path is not None:
+        straight = np.array([problem.start, problem.goal])
+        axes.plot(*straight.T, color="white", lw=1.1, ls=(0, (4, 3)), zorder=4, label="straight")
+        axes.plot(
+            *solution.path.points.T,
+            color=PATH_COLOUR,
+            lw=2.4,
+            zorder=5,
+            path_effects=halo,
+            solid_capstyle="round",
+            label="route",
+        )
+    marks = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
+    axes.plot(*problem.start, "o", color="#0b6e4f", ms=9, label="start", **marks)
+    axes.plot(*problem.goal, "*", color="#ffb000", ms=15, label="goal", **marks)
+
+
+def draw_map(axes: Any, solution: Solution) -> None:
+    """Draw everything onto two-dimensional axes."""
+    problem = solution.problem
+    terrain = Terrain.sample(problem, SAMPLES)
+    axes.imshow(
+        terrain.shaded(0), extent=_extent(problem), origin="lower", interpolation="bilinear"
+    )
+    _draw_contours(axes, terrain)
+    draw_obstacles(axes, problem, terrain)
+    _draw_tree(axes, solution)
+    _draw_path(axes, solution)
+    axes.set(xlim=_extent(problem)[:2], ylim=_extent(problem)[2:], aspect="equal")
+    label_axes(axes, problem)
+    axes.legend(loc="upper left", fontsize=8, framealpha=0.85)
+    colours = ScalarMappable(terrain.norm(0), height_colours())
+    axes.figure.colorbar(colours, ax=axes, label=terrain.label(0), shrink=0.72, pad=0.02)

@@ -1,0 +1,120 @@
+"""The surface in three dimensions, with the path on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from scipy.ndimage import map_coordinates
+
+from ..problem import Solution
+from ..validation import Array
+from .map_view import PATH_COLOUR
+from .terrain import LAYER_COLOURS, Terrain, height_colours, label_axes
+
+SAMPLES = 180
+ELEVATION, AZIMUTH = 42.0, -115.0  # degrees: where the viewer stands
+RELIEF = 0.26  # height of the drawn box, as a share of its longer side
+SIGHT_STEPS = 240
+
+
+def _view_direction(box: Array, spread: Array) -> Array:
+    """Direction from the surface to the viewer, in data units."""
+    elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
+    unit = np.array(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ]
+    )
+    return np.asarray(unit * spread / box)
+
+
+def _is_hidden(
+    terrain: Terrain, lifted: Array, towards: Array, lift: float
+) -> npt.NDArray[np.bool_]:
+    """Which points (m, 3) lie behind the surface, by walking from each towards the viewer."""
+    reach = (terrain.values[0].max() - lifted[:, 2].min()) / towards[2]
+    steps = np.linspace(0.0, reach, SIGHT_STEPS)[1:, None, None]
+    sight = lifted + steps * towards
+    column = (sight[..., 0] - terrain.x[0]) / (terrain.x[1] - terrain.x[0])
+    row = (sight[..., 1] - terrain.y[0]) / (terrain.y[1] - terrain.y[0])
+    ground = map_coordinates(
+        terrain.values[0], [row, column], order=1, mode="constant", cval=-np.inf
+    )
+    return np.asarray((ground > sight[..., 2] + lift).any(axis=0))
+
+
+def _draw_path(axes: Any, solution: Solution, terrain: Terrain, box: Array, spread: Array) -> None:
+    """The path: a strong line where it is in sight, a faint dotted one where it is behind."""
+    if solution.path is None:
+        return
+    profile = solution.path.profile
+    lift = 0.008 * float(spread[2])
+    lifted = np.column_stack([profile.points, profile.values[:, 0] + lift])
+    hidden = _is_hidden(terrain, lifted, _view_direction(box, spread), lift)
+    shown, behind = lifted.copy(), lifted.copy()
+    shown[hidden] = np.nan
+    behind[~hidden] = np.nan
+    axes.plot(*behind.T, color=PATH_COLOUR, lw=1.2, ls=":", zorder=10)
+    axes.plot(*shown.T, color="white", lw=4.0, zorder=11)
+    axes.plot(*shown.T, color=PATH_COLOUR, lw=2.2, zorder=12)
+    for end, marker, colour, size in ((0, "o", "#0b6e4f", 8), (-1, "*", "#ffb000", 14)):
+        style = {"markeredgecolor": "white", "zorder": 13}
+        axes.plot(*lifted[end][:, None], marker, color=colour, ms=size, **style)
+
+
+def draw_perspective(axes: Any, solution: Solution) -> None:
+    """Draw the surface onto 3-D axes, coloured by the second layer where there is one."""
+    problem = solution.problem
+    terrain = Terrain.sample(problem, SAMPLES)
+    layer = 1 if len(terrain.values) > 1 else 0
+    grid_x, grid_y = np.meshgrid(terrain.x, terrain.y)
+    colours = terrain.shaded(layer)
+    colours[terrain.blocked] = 0.23
+    axes.set_proj_type("ortho")
+    axes.computed_zorder = False
+    axes.plot_surface(
+        grid_x,
+        grid_y,
+        terrain.values[0],
+        facecolors=colours,
+        rcount=len(terrain.y),
+        ccount=len(terrain.x),
+        linewidth=0,
+        antialiased=False,
+        shade=False,
+        zorder=1,
+    )
+    bounds = problem.bounds
+    longer = max(bounds.width, bounds.height)
+    box = np.array([bounds.width / longer, bounds.height / longer, RELIEF])
+    low, high = float(terrain.values[0].min()), float(terrain.values[0].max())
+    high = high if high > low else low + 1.0
+    axes.set(xlim=(bounds.x1_min, bounds.x1_max), ylim=(bounds.x2_min, bounds.x2_max))
+    axes.set_zlim(low, high)
+    axes.margins(0.0)
+    axes.set_box_aspect(box, zoom=1.15)
+    axes.view_init(elev=ELEVATION, azim=AZIMUTH)
+    _draw_path(axes, solution, terrain, box, np.array([bounds.width, bounds.height, high - low]))
+    label_axes(axes, problem)
+    axes.zaxis.set_major_locator(_few_ticks())
+    cmap = height_colours() if layer == 0 else colormaps[LAYER_COLOURS]
+    if layer == 1:
+        scale = ScalarMappable(terrain.norm(layer), cmap)
+        axes.figure.colorbar(scale, ax=axes, label=terrain.label(layer), shrink=0.6, pad=0.08)
+    exaggeration = RELIEF * longer / (high - low)
+    if problem.surface.unit == problem.surface.layers[0].unit and exaggeration > 1.05:
+        axes.text2D(
+            0.02, 0.02, f"heights drawn {exaggeration:.1f} times", transform=axes.transAxes, size=8
+        )
+
+
+def _few_ticks() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(4)

@@ -1,0 +1,108 @@
+"""A surface sampled for drawing: values, hill shade, colours, and units for the axes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import LightSource, Normalize
+from matplotlib.ticker import FuncFormatter
+
+from ..problem import Problem
+from ..validation import Array
+
+HEIGHT_COLOURS = "gist_earth"
+LAYER_COLOURS = "plasma"
+# Relief that looks like relief: the surface is shaded as if its range were this share of
+# its extent.
+SHADED_RELIEF = 0.12
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """The layers of a problem's region on a regular grid."""
+
+    problem: Problem
+    x: Array  # (nx,), map units
+    y: Array  # (ny,)
+    values: Array  # (layers, ny, nx), in the layers' units
+
+    @classmethod
+    def sample(cls, problem: Problem, side: int) -> Terrain:
+        """At most ``side`` samples along the longer side of the region."""
+        bounds = problem.bounds
+        longer = max(bounds.width, bounds.height)
+        columns = max(8, round(side * bounds.width / longer))
+        rows = max(8, round(side * bounds.height / longer))
+        x = np.linspace(bounds.x1_min, bounds.x1_max, columns)
+        y = np.linspace(bounds.x2_min, bounds.x2_max, rows)
+        points = np.stack(np.meshgrid(x, y), axis=-1)
+        return cls(problem, x, y, np.moveaxis(problem.surface.values(points), -1, 0))
+
+    @cached_property
+    def blocked(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """(ny, nx): samples in a mask's blocked cells."""
+        found = np.zeros((len(self.y), len(self.x)), bool)
+        for mask in self.problem.free_space.masks:
+            dx, dy = mask.spacing
+            i = np.floor((self.x - mask.x[0]) / dx + 0.5).astype(int)
+            j = np.floor((self.y - mask.y[0]) / dy + 0.5).astype(int)
+            rows, columns = mask.blocked.shape
+            ok = np.ix_((j >= 0) & (j < rows), (i >= 0) & (i < columns))
+            cells = mask.blocked[np.clip(j, 0, rows - 1)][:, np.clip(i, 0, columns - 1)]
+            found[ok] |= cells[ok]
+        return found
+
+    def label(self, layer: int) -> str:
+        """Name and unit of a layer."""
+        shown = self.problem.surface.layers[layer]
+        return f"{shown.name} ({shown.unit})" if shown.unit else shown.name
+
+    def norm(self, layer: int) -> Normalize:
+        """Colour scale over the part of a layer that is not blocked."""
+        values = self.values[layer][~self.blocked]
+        low, high = float(values.min()), float(values.max())
+        return Normalize(low, high if high > low else low + 1.0)
+
+    def shaded(self, layer: int) -> Array:
+        """(ny, nx, 3): a layer's colours under the light that falls on the first layer."""
+        name = HEIGHT_COLOURS if layer == 0 else LAYER_COLOURS
+        norm = self.norm(layer)
+        fraction = norm(self.values[layer])
+        if layer == 0:  # leave out the sea and the snow of the colour map
+            fraction = 0.22 + 0.68 * np.asarray(fraction)
+        colours = colormaps[name](fraction)[..., :3]
+        height = self.values[0]
+        extent = max(self.problem.bounds.width, self.problem.bounds.height)
+        spread = float(np.ptp(height)) or 1.0
+        light = LightSource(azdeg=315, altdeg=40)
+        lit = light.shade_rgb(
+            colours,
+            height * (SHADED_RELIEF * extent / spread),
+            blend_mode="soft",
+            dx=float(self.x[1] - self.x[0]),
+            dy=-float(self.y[1] - self.y[0]),
+        )
+        return np.clip(np.asarray(lit, np.float64), 0.0, 1.0)
+
+
+def height_colours() -> Any:
+    """The part of the colour map that heights are drawn in."""
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps[HEIGHT_COLOURS](np.linspace(0.22, 0.90, 256)))
+
+
+def label_axes(axes: Any, problem: Problem) -> None:
+    """Axis labels with units; kilometres where metres would be long."""
+    unit = problem.surface.unit
+    if unit == "m" and max(problem.bounds.width, problem.bounds.height) >= 10_000.0:
+        unit = "km"
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 1000.0:g}"))
+    suffix = f" ({unit})" if unit else ""
+    axes.set_xlabel(f"$x_1${suffix}")
+    axes.set_ylabel(f"$x_2${suffix}")
