@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 
@@ -10,6 +11,9 @@ import numpy as np
 import shapely
 import sympy
 from scipy.integrate import quad
+
+from terrapath import FreeSpace
+from terrapath.validation import Bounds
 
 # Surfaces and the metric
 
@@ -55,7 +59,8 @@ def peaks_expressions(layers):
     x1, x2 = sympy.symbols("x1 x2", real=True)
     return [
         sum(
-            sympy.Float(a, 17) * sympy.exp(-sympy.Float(falloff, 17) * ((x1 - cx) ** 2 + (x2 - cy) ** 2))
+            sympy.Float(a, 17)
+            * sympy.exp(-sympy.Float(falloff, 17) * ((x1 - cx) ** 2 + (x2 - cy) ** 2))
             for a, falloff, cx, cy in layer
         )
         for layer in layers
@@ -67,10 +72,17 @@ def _evaluate(expression, x, y):
     return np.broadcast_to(sympy.lambdify((x1, x2), expression, "numpy")(x, y), np.shape(x))
 
 
-def derivative_from_sympy(expression, variables, x, y):
-    """A derivative, such as ("x1", "x2") for the mixed second one, at points."""
-    symbols = [sympy.Symbol(name, real=True) for name in variables]
-    return _evaluate(sympy.diff(expression, *symbols) if symbols else expression, x, y)
+@functools.cache
+def _peak_derivative(variables):
+    x1, x2, a, falloff, cx, cy = symbols = sympy.symbols("x1 x2 a falloff cx cy", real=True)
+    value = a * sympy.exp(-falloff * ((x1 - cx) ** 2 + (x2 - cy) ** 2))
+    wanted = [{"x1": x1, "x2": x2}[name] for name in variables]
+    return sympy.lambdify(symbols, sympy.diff(value, *wanted) if wanted else value, "numpy")
+
+
+def peaks_derivative_from_sympy(layer, variables, x, y):
+    """A derivative of one layer, such as ("x1", "x2") for the mixed second one, at points."""
+    return sum(_peak_derivative(variables)(x, y, *peak) for peak in layer)
 
 
 def metric_from_sympy(expressions, x, y):
@@ -160,9 +172,7 @@ def boxes_of_mask(mask):
     """The blocked cells of a mask as closed boxes around their centres."""
     dx, dy = mask.x[1] - mask.x[0], mask.y[1] - mask.y[0]
     return [
-        shapely.box(
-            mask.x[i] - dx / 2, mask.y[j] - dy / 2, mask.x[i] + dx / 2, mask.y[j] + dy / 2
-        )
+        shapely.box(mask.x[i] - dx / 2, mask.y[j] - dy / 2, mask.x[i] + dx / 2, mask.y[j] + dy / 2)
         for j, i in np.argwhere(mask.blocked)
     ]
 
@@ -183,9 +193,7 @@ def visibility_graph_length(start, goal, polygons):
         for polygon in polygons
         for part in shapely.get_parts(polygon)
     ]
-    corners = {
-        tuple(corner) for polygon in filled for corner in shapely.get_coordinates(polygon)
-    }
+    corners = {tuple(corner) for polygon in filled for corner in shapely.get_coordinates(polygon)}
     start, goal = tuple(map(float, start)), tuple(map(float, goal))
     nodes = [start, goal, *sorted(corners - {start, goal})]
     graph = networkx.Graph()
@@ -212,3 +220,9 @@ def within_by_force(x, y, at, radius):
     """Indices of the points at most ``radius`` away."""
     squared = (np.asarray(x) - at[0]) ** 2 + (np.asarray(y) - at[1]) ** 2
     return set(np.flatnonzero(squared <= radius * radius).tolist())
+
+
+def is_blocked(mask, place):
+    """Does free space with this mask alone refuse the point?"""
+    everywhere = Bounds(-1e9, -1e9, 1e9, 1e9)
+    return FreeSpace(everywhere, [mask]).blocker(tuple(place)) is not None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import networkx as nx
 import numpy as np
@@ -69,13 +69,13 @@ def line_r(layers: Layers, a: Point, b: Point, panel: float) -> float:
         (a[0] + k / pieces * (b[0] - a[0]), a[1] + k / pieces * (b[1] - a[1]))
         for k in range(pieces + 1)
     ]
-    return sum(boole(layers, p, q) for p, q in zip(ends[:-1], ends[1:], strict=True))
+    return sum(boole(layers, p, q) for p, q in pairwise(ends))
 
 
 def polyline_length(layers: Layers, points: np.ndarray) -> float:
     """True length of a polyline on the surface, by QUADPACK on the formula."""
     total = 0.0
-    for (ax, ay), (bx, by) in zip(points[:-1], points[1:], strict=True):
+    for (ax, ay), (bx, by) in pairwise(points):
         dx, dy = bx - ax, by - ay
 
         def integrand(t: float, ax=ax, ay=ay, dx=dx, dy=dy) -> float:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import nearest_by_force, within_by_force
 
+from oracles import nearest_by_force, within_by_force
 from terrapath._kernels import buckets as kernels
 from terrapath._kernels.rrt_star import CANDIDATE, VERTEX
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+
 import terrapath as tp
 from terrapath import scenes
 from terrapath._kernels import compiler
@@ -142,7 +143,9 @@ def test_the_chunk_size_does_not_change_the_path_of_rrt(chunk, monkeypatch):
     assert expected.cost == found.cost
 
 
-@pytest.mark.parametrize("options", [{}, {"radius_factor": 0.5}, {"informed": False}, {"step": 0.3}])
+@pytest.mark.parametrize(
+    "options", [{}, {"radius_factor": 0.5}, {"informed": False}, {"step": 0.3}]
+)
 def test_a_longer_run_begins_as_the_shorter_one(options, monkeypatch):
     problem = scenes.load("six-peaks")
     for seed in range(6):

@@ -1,11 +1,15 @@
 """The metric h, and the lengths that it gives to segments and curves."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import RectBivariateSpline
+
+import terrapath as tp
 from oracles import (
     exact_curve_length,
     metric_from_sympy,
@@ -13,9 +17,6 @@ from oracles import (
     peaks_gradients,
 )
 from oracles import line_r as line_r_by_algorithm_1
-from scipy.interpolate import RectBivariateSpline
-
-import terrapath as tp
 from terrapath import metric
 
 BOUNDS = (-1.0, -1.0, 11.0, 11.0)
@@ -25,9 +26,7 @@ def numbers(low, high):
     return st.floats(low, high, allow_subnormal=False)
 
 
-peak = st.tuples(
-    numbers(-6.0, 6.0), numbers(0.02, 2.0), numbers(-1.0, 11.0), numbers(-1.0, 11.0)
-)
+peak = st.tuples(numbers(-6.0, 6.0), numbers(0.02, 2.0), numbers(-1.0, 11.0), numbers(-1.0, 11.0))
 layer_lists = st.lists(st.lists(peak, min_size=1, max_size=3), min_size=1, max_size=3)
 weight_lists = st.lists(numbers(0.0, 5.0), min_size=3, max_size=3)
 point = st.tuples(numbers(-1.0, 11.0), numbers(-1.0, 11.0))
@@ -63,7 +62,7 @@ def hilly_grid(seed=0):
 
 
 @given(layer_lists, weight_lists, seeds)
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=6)
 def test_the_metric_is_what_sympy_finds_from_the_lift(layers, weights, seed):
     points = points_in(BOUNDS, 12, seed).reshape(3, 4, 2)
     found = metric.metric_tensor(weighted(layers, weights), points)
@@ -132,7 +131,7 @@ def test_the_lift_is_an_isometry(layers, weights, curve):
         t = np.linspace(0, 1, pieces + 1)[:, None]
         return sum(
             np.linalg.norm(np.diff(surface.lift(a + t * (b - a)), axis=0), axis=1).sum()
-            for a, b in zip(curve[:-1], curve[1:], strict=True)
+            for a, b in itertools.pairwise(curve)
         )
 
     coarse, middle, fine = (lifted_length(n) for n in (2000, 4000, 8000))
@@ -194,21 +193,21 @@ def test_line_r_is_algorithm_1(layers, weights, a, b):
 
 def test_line_r_on_a_spline_is_algorithm_1():
     surface, gradients = hilly_grid()
-    for a, b in zip(points_in(surface.bounds, 20, 1), points_in(surface.bounds, 20, 2), strict=True):
+    for a, b in zip(
+        points_in(surface.bounds, 20, 1), points_in(surface.bounds, 20, 2), strict=True
+    ):
         expected = line_r_by_algorithm_1(gradients, a, b)
         assert metric.line_r(surface, a, b) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("a", "b"), [((2.0, 1.0), (5.0, 4.5)), ((0, 0), (10, 10)), ((6.0, 8.0), (3.5, 2.0))]
+    ("a", "b"), [((3.2, 3.1), (5.0, 4.6)), ((1.0, 1.5), (2.5, 2.0)), ((4.0, 4.0), (5.5, 5.2))]
 )
 def test_line_r_converges_at_order_6_as_a_segment_is_cut(a, b):
     surface = tp.Surface.from_peaks(SIX_PEAKS)
     a, b = np.array(a, float), np.array(b, float)
     exact = exact_curve_length(peaks_gradients(SIX_PEAKS), [a, b], pieces=16)
-    length = np.hypot(*(b - a))
-    pieces = np.unique(np.round(length * np.array([4, 6, 8, 11])).astype(int))
-    errors = []
+    pieces, errors = np.array([8, 12, 16, 24, 32]), []
     for n in pieces:
         cuts = a + np.linspace(0, 1, n + 1)[:, None] * (b - a)
         errors.append(abs(metric.line_r(surface, cuts[:-1], cuts[1:]).sum() - exact))
@@ -236,10 +235,11 @@ def test_chords_are_a_metric_below_the_true_length(layers, weights, three):
     assert ab == pytest.approx(np.linalg.norm(surface.lift(b) - surface.lift(a)), rel=1e-12)
     assert metric.chord(surface, b, a) == ab
     assert metric.chord(surface, a, a) == 0.0
-    assert ac <= (ab + bc) * (1 + 1e-14)
-    assert np.hypot(*(b - a)) <= ab * (1 + 1e-14)
+    tiny = 1e-150  # squares of smaller numbers are 0
+    assert ac <= (ab + bc) * (1 + 1e-14) + tiny
+    assert np.hypot(*(b - a)) <= ab * (1 + 1e-14) + tiny
     assert ab <= metric.curve_length(surface, [a, b]) * (1 + 1e-9)
-    assert ac <= metric.curve_length(surface, [a, b, c]) * (1 + 1e-9)
+    assert ac <= metric.curve_length(surface, [a, b, c]) * (1 + 1e-9) + tiny
 
 
 # Weights and shapes
@@ -249,9 +249,7 @@ def test_chords_are_a_metric_below_the_true_length(layers, weights, three):
 @settings(deadline=None, max_examples=40)
 def test_a_weight_is_a_scale_of_the_layer(layers, weight, a, b):
     by_weight = tp.Surface.from_peaks(layers, weights=[weight] * len(layers))
-    by_hand = tp.Surface.from_peaks(
-        [[(weight * p[0], *p[1:]) for p in layer] for layer in layers]
-    )
+    by_hand = tp.Surface.from_peaks([[(weight * p[0], *p[1:]) for p in layer] for layer in layers])
     for measure in (metric.line_r, metric.chord, metric.segment_lengths):
         assert measure(by_weight, a, b) == pytest.approx(measure(by_hand, a, b), rel=1e-11)
     np.testing.assert_allclose(
@@ -304,7 +302,9 @@ def test_both_ends_of_a_segment_must_lie_on_the_surface():
         metric.metric_tensor(surface, (7, 1))
 
 
-@pytest.mark.parametrize("curve", [[(0, 0)], [], (0, 0), [[(0, 0)], [(1, 1)]], [(0, 0, 0), (1, 1, 1)]])
+@pytest.mark.parametrize(
+    "curve", [[(0, 0)], [], (0, 0), [[(0, 0)], [(1, 1)]], [(0, 0, 0), (1, 1, 1)]]
+)
 def test_what_is_no_curve_is_refused(curve):
     with pytest.raises(tp.InputError):
         metric.curve_length(tp.Surface.from_peaks(SIX_PEAKS), curve)

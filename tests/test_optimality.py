@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import planner_oracles as oracles
 import pytest
 import shapely
+
+import planner_oracles as oracles
 import terrapath as tp
 from terrapath import scenes
 
@@ -144,15 +145,14 @@ LAYOUTS = {
     "nothing": [],
     "box": [shapely.box(3.0, 2.0, 8.0, 7.0)],
     "corridor": [shapely.box(3.0, -2.0, 7.0, 6.8), shapely.box(3.0, 7.0, 7.0, 12.0)],
-    "wall of boxes": [
-        shapely.box(4.0, -1.5 + 1.6 * k, 5.5, -0.2 + 1.6 * k) for k in range(8)
-    ],
+    "wall of boxes": [shapely.box(4.0, -1.5 + 1.6 * k, 5.5, -0.2 + 1.6 * k) for k in range(8)],
     "chicane": [shapely.box(2.0, -2.0, 3.0, 8.0), shapely.box(6.0, 1.0, 7.0, 12.0)],
     "horseshoe": [
         shapely.Polygon([(2, 2), (9, 2), (9, 9), (2, 9), (2, 8), (8, 8), (8, 3), (2, 3)])
     ],
     "courtyard": [
-        shapely.box(6.0, 6.0, 10.9, 10.9) - shapely.box(7.0, 7.0, 10.4, 10.4)
+        shapely.box(6.0, 6.0, 10.9, 10.9)
+        - shapely.box(7.0, 7.0, 10.4, 10.4)
         - shapely.box(9.0, 5.0, 9.8, 7.5)
     ],
     "triangles": [

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import planner_oracles as oracles
 import pytest
 import shapely
+
+import planner_oracles as oracles
 import terrapath as tp
 from terrapath import scenes
 from terrapath.planners import tree_search
@@ -111,7 +112,9 @@ def test_pruning_changes_no_bit_on_a_spline_surface():
     x = np.linspace(-1.0, 11.0, 25)
     values = np.random.default_rng(8).normal(scale=0.6, size=(2, 25, 25))
     problem = tp.Problem(tp.Surface.from_grid(values, x, x), (0, 0), (10, 10), obstacles=OBSTACLES)
-    pruned, whole = (tp.RRTStar(samples=3000, prune=p, seed=5).solve(problem) for p in (True, False))
+    pruned, whole = (
+        tp.RRTStar(samples=3000, prune=p, seed=5).solve(problem) for p in (True, False)
+    )
     np.testing.assert_array_equal(pruned.tree.points, whole.tree.points)
     np.testing.assert_array_equal(pruned.tree.parents, whole.tree.parents)
     np.testing.assert_array_equal(pruned.tree.costs, whole.tree.costs)
@@ -200,9 +203,7 @@ def test_no_near_vertex_offers_a_better_parent_to_the_newest_one():
         distances = np.hypot(*(tree.points[:-1] - tree.points[-1]).T)
         near = np.flatnonzero(distances <= radius)
         a, b = tree.points[near], tree.points[-1]
-        lengths = np.maximum(
-            tp.line_r(problem.surface, a, b), tp.chord(problem.surface, a, b)
-        )
+        lengths = np.maximum(tp.line_r(problem.surface, a, b), tp.chord(problem.surface, a, b))
         assert len(near) > 5
         assert tree.costs[newest] == pytest.approx((tree.costs[near] + lengths).min(), rel=1e-12)
 
@@ -234,8 +235,10 @@ def test_informed_sampling_finds_shorter_paths_than_uniform_sampling():
     problem = scene("one-peak")
     lengths = {
         informed: np.mean(
-            [tp.RRTStar(samples=3000, seed=s, informed=informed).solve(problem).length
-             for s in range(6)]
+            [
+                tp.RRTStar(samples=3000, seed=s, informed=informed).solve(problem).length
+                for s in range(6)
+            ]
         )
         for informed in (True, False)
     }

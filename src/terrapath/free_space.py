@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 from ._kernels import free_space as kernels
 from .errors import InputError
 from .surface import Mask
-from .validation import Array, Bounds, as_points, require_positive
+from .validation import Array, Bounds, as_array, require_positive
 
 # Around two edges a cell keeps the lists short and the index small.
 EDGES_PER_CELL = 2.0
@@ -34,10 +34,6 @@ class Circle:
         require_positive(radius=self.radius)
         if not (math.isfinite(self.x1) and math.isfinite(self.x2)):
             raise InputError(f"the centre ({self.x1}, {self.x2}) of a circle is not finite")
-
-    def covers(self, x1: float, x2: float) -> bool:
-        """Does the point lie in the disc?"""
-        return math.hypot(x1 - self.x1, x2 - self.x2) <= self.radius
 
 
 Obstacle: TypeAlias = BaseGeometry | Circle | Mask
@@ -141,12 +137,17 @@ class FreeSpace:
         """What makes a point not free, in words; None where it is free."""
         if not self.bounds.contains(np.array(point)):
             return f"outside the bounds {self.bounds}"
-        if any(circle.covers(*point) for circle in self.circles):
-            return "inside a circular obstacle"
+        masks = range(len(self.masks))
+        if any(kernels.mask_is_hit(self.data, mask, *point, *point) for mask in masks):
+            return "in a blocked or no-data cell"
         if any(shapely.intersects_xy(geometry, *point) for geometry in self.geometries):
             return "inside an obstacle"
-        if any(mask.covers(*point) for mask in self.masks):
-            return "in a blocked or no-data cell"
+        discs = ((circle.x1, circle.x2, circle.radius) for circle in self.circles)
+        if any(kernels.may_enter_circle(*point, *point, *disc) for disc in discs):
+            return "inside a circular obstacle"
+        # The kernel's own answer: a point that it takes for a touch could never be left.
+        if not kernels.segment_is_free(self.data, *point, *point):
+            return "on the edge of an obstacle"
         return None
 
     def segments_are_free(self, a: Any, b: Any) -> npt.NDArray[np.bool_]:
@@ -154,7 +155,9 @@ class FreeSpace:
 
         In doubt, within rounding of a touch, the answer is no.
         """
-        start, end = as_points(a), as_points(b)
+        start, end = as_array(a, "a", shape=(None, 2)), as_array(b, "b", shape=(None, 2))
+        if len(start) != len(end):
+            raise InputError(f"a has {len(start)} points and b {len(end)}; give as many of both")
         free = np.empty(len(start), np.uint8)
         kernels.fill_free(self.data, start, end, free)
         return free.astype(bool)

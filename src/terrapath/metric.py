@@ -10,10 +10,13 @@ from ._kernels import lengths
 from ._kernels.surfaces import fill_metric
 from .errors import InputError
 from .surface import Surface
-from .validation import Array
+from .validation import Array, as_points
 
 # Relative tolerance of a true length; what is promised is 1e-9.
 QUADRATURE_TOLERANCE = 1e-12
+
+# The 15-point rule is first laid over pieces this many features of the surface long.
+FEATURES_PER_PIECE = 8.0
 
 
 def metric_tensor(surface: Surface, points: Any) -> Array:
@@ -52,7 +55,13 @@ def inverse_metric_tensor(surface: Surface, points: Any) -> Array:
 
 def _measure(kernel: Any, surface: Surface, a: Any, b: Any, *options: float) -> Array:
     """Run a kernel over segments a-b, each (..., 2), broadcast against one another."""
-    start, end = np.broadcast_arrays(np.asarray(a, np.float64), np.asarray(b, np.float64))
+    start, end = as_points(a, "a"), as_points(b, "b")
+    try:
+        start, end = np.broadcast_arrays(start, end)
+    except ValueError:
+        raise InputError(
+            f"a has shape {start.shape} and b {end.shape}; they do not fit one another"
+        ) from None
     flat_start, shape = surface._points(start)
     flat_end, _ = surface._points(end)
     measured = np.empty(len(flat_start))
@@ -82,7 +91,8 @@ def segment_lengths(surface: Surface, a: Any, b: Any) -> Array:
 
     a, b : (..., 2), map units. Returns (...), map units. Source: paper, equation (3).
     """
-    return _measure(lengths.fill_segment_lengths, surface, a, b, QUADRATURE_TOLERANCE)
+    longest = FEATURES_PER_PIECE * surface.resolution
+    return _measure(lengths.fill_segment_lengths, surface, a, b, longest, QUADRATURE_TOLERANCE)
 
 
 def curve_length(surface: Surface, points: Any) -> float:
@@ -90,7 +100,7 @@ def curve_length(surface: Surface, points: Any) -> float:
 
     The same as the length of the lifted curve in R^n. Source: paper, equation (3).
     """
-    array = np.asarray(points, np.float64)
+    array = as_points(points)
     if array.ndim != 2 or len(array) < 2:
         raise InputError(f"points has shape {array.shape}; a curve needs (m, 2) with m >= 2")
     return float(segment_lengths(surface, array[:-1], array[1:]).sum())

@@ -72,7 +72,8 @@ def as_array(values: Any, name: str, *, shape: tuple[int | None, ...]) -> Array:
     try:
         array = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{name} is not an array of numbers; got {values!r:.60}") from None
+        shown = " ".join(repr(values).split())
+        raise InputError(f"{name} is not an array of numbers; got {shown:.60}") from None
     expected = "(" + ", ".join("*" if size is None else str(size) for size in shape) + ")"
     if array.ndim != len(shape) or any(
         size is not None and size != actual for size, actual in zip(shape, array.shape, strict=True)
@@ -146,6 +147,13 @@ def require_count(most: int = 2**31 - 3, **values: Any) -> None:
     for name, value in values.items():
         if not (_is_whole(value) and 1 <= value <= most):
             raise InputError(f"{name}={_describe(value)} must be a whole number from 1 to {most:,}")
+
+
+def require_bool(**values: Any) -> None:
+    """Each value is True or False."""
+    for name, value in values.items():
+        if not isinstance(value, bool):
+            raise InputError(f"{name}={value!r} must be True or False")
 
 
 def require_seed(seed: Any) -> None:

@@ -58,9 +58,9 @@ _MARGIN = 1e-7
 @kernel
 def span(low, high, origin, size, count):
     """Cells of one axis that [low, high] touches, limited to the grid."""
-    first = math.floor((low - origin) / size - _MARGIN)
-    last = math.floor((high - origin) / size + _MARGIN)
-    return Span(max(first, 0), min(last, count - 1))
+    first = math.floor(max((low - origin) / size - _MARGIN, 0.0))
+    last = math.floor(min((high - origin) / size + _MARGIN, count - 1.0))
+    return Span(first, last)
 
 
 @kernel

@@ -121,20 +121,20 @@ _SHORTEST = 0.5**_LEVELS
 
 
 @kernel
-def segment_length(surface, ax, ay, bx, by, tolerance):
-    """Length of the segment a-b under h by adaptive bisection.
+def piece_length(surface, ax, ay, dx, dy, low, high, tolerance):
+    """The integral of |v|_h over t in [low, high] by adaptive bisection.
 
     Pieces are halved until each one's error estimate is under ``tolerance`` times the
-    whole length. The estimate is that of the 7-point rule, so the 15-point value that
-    is summed is better still.
+    whole. The estimate is that of the 7-point rule, so the 15-point value that is summed
+    is better still.
     """
-    dx, dy = bx - ax, by - ay
     pending = np.empty(_LEVELS + 1)
-    low, high, depth, total = 0.0, 1.0, 0, 0.0
+    shortest = _SHORTEST * (high - low)
+    depth, total = 0, 0.0
     value, error = gauss_kronrod(surface, ax, ay, dx, dy, low, high)
     allowed = tolerance * value
     while True:
-        if not error > allowed or high - low <= _SHORTEST:
+        if not error > allowed or high - low <= shortest:
             total += value
             if depth == 0:
                 return total
@@ -145,6 +145,22 @@ def segment_length(surface, ax, ay, bx, by, tolerance):
             depth += 1
             high = 0.5 * (low + high)
         value, error = gauss_kronrod(surface, ax, ay, dx, dy, low, high)
+
+
+@kernel
+def segment_length(surface, ax, ay, bx, by, longest, tolerance):
+    """True length of the segment a-b under h.
+
+    It is cut into pieces of at most ``longest`` on the plane, few enough of the surface's
+    features long that no feature falls between the nodes of the first rule unseen.
+    """
+    dx, dy = bx - ax, by - ay
+    pieces = max(math.ceil(math.hypot(dx, dy) / longest), 1)
+    total = 0.0
+    for k in range(pieces):
+        low, high = k / pieces, (k + 1) / pieces
+        total += piece_length(surface, ax, ay, dx, dy, low, high, tolerance)
+    return total
 
 
 # Many segments at once
@@ -163,6 +179,7 @@ def fill_chords(surface, a, b, lengths):
 
 
 @kernel
-def fill_segment_lengths(surface, a, b, tolerance, lengths):
+def fill_segment_lengths(surface, a, b, longest, tolerance, lengths):
     for m in range(a.shape[0]):
-        lengths[m] = segment_length(surface, a[m, 0], a[m, 1], b[m, 0], b[m, 1], tolerance)
+        ax, ay, bx, by = a[m, 0], a[m, 1], b[m, 0], b[m, 1]
+        lengths[m] = segment_length(surface, ax, ay, bx, by, longest, tolerance)

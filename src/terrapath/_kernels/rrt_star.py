@@ -52,6 +52,7 @@ VERTEX = np.dtype(
 CANDIDATE = np.dtype(
     [
         ("chord", np.float64),
+        ("cost", np.float64),  # of the other vertex, before this extension
         ("length", np.float64),  # negative where not yet measured
         ("vertex", np.int32),
         ("free", np.int32),  # 1 free, 0 blocked, -1 not yet tested
@@ -239,6 +240,7 @@ def find_near(tree, new, radius, nearest_vertex):
     for k in range(count):
         candidate = tree.near[k]
         candidate.chord = chord_between(tree, new, candidate.vertex)
+        candidate.cost = tree.vertices[candidate.vertex].cost
         candidate.length = -1.0
         # The nearest vertex's edge was tested before the new vertex was placed.
         candidate.free = 1 if candidate.vertex == nearest_vertex else -1
@@ -251,7 +253,7 @@ def most_promising(tree, count):
     best = -1
     least = math.inf
     for k in range(count):
-        bound = tree.vertices[tree.near[k].vertex].cost + tree.near[k].chord
+        bound = tree.near[k].cost + tree.near[k].chord
         if bound < least:
             best, least = k, bound
     return best
@@ -272,7 +274,7 @@ def choose_parent(surface, space, tree, options, new, count):
         k = promising if turn == -1 else turn
         if turn == promising:
             continue
-        come = tree.vertices[tree.near[k].vertex].cost
+        come = tree.near[k].cost
         if options.prune and come + tree.near[k].chord >= least:
             tree.counters[PRUNED] += 1
             continue
@@ -284,17 +286,22 @@ def choose_parent(surface, space, tree, options, new, count):
 
 @kernel
 def rewire(surface, space, tree, options, new, count):
-    """Hang candidates below the new vertex where that shortens their way."""
+    """Hang candidates below the new vertex where that shortens their way.
+
+    Costs are compared as they were before this extension, Cost in the graph G of Algorithm 3.
+    Rewiring one candidate can shorten the way to another; looking at that would let the order
+    in which the candidates are visited decide the tree.
+    """
     come = tree.vertices[new].cost
     for k in range(count):
         near = tree.near[k].vertex
         if near == tree.vertices[new].parent:
             continue
-        if options.prune and come + tree.near[k].chord >= tree.vertices[near].cost:
+        if options.prune and come + tree.near[k].chord >= tree.near[k].cost:
             tree.counters[PRUNED] += 1
             continue
         length = candidate_length(surface, tree, options, new, k)
-        if come + length < tree.vertices[near].cost and candidate_is_free(space, tree, new, k):
+        if come + length < tree.near[k].cost and candidate_is_free(space, tree, new, k):
             tree.counters[REWIRED] += 1
             release(tree.vertices, near)
             adopt(tree.vertices, new, near, length)

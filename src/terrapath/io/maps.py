@@ -13,10 +13,11 @@ from pyproj import CRS
 
 from ..errors import InputError, MapError
 from ..surface import Surface
+from ..surface.georeference import Georeference
 from ..surface.raster import Raster, parse_crs
 from ..validation import Array, require_not_negative
 
-_SOURCE = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?")
+_SOURCE = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,6 @@ class LayerSource:
     def parse(cls, text: str) -> LayerSource:
         """FILE[:BAND][*WEIGHT]."""
         match = _SOURCE.fullmatch(text)
-        assert match is not None or not text
         try:
             if match is None:
                 raise ValueError
@@ -55,7 +55,10 @@ class LayerSource:
         raise InputError(f"layer source {source!r} is not a path, FILE:BAND*WEIGHT or LayerSource")
 
 
-def _damaged(path: Path, error: Exception) -> MapError:
+def _unreadable(path: Path, error: Exception) -> MapError:
+    # Asked only now: GDAL also reads names that are no paths, as in /vsizip/.
+    if not path.exists():
+        return MapError(f"{path} does not exist; check the path")
     # Rasterio puts the reason into the cause: its own message only points there.
     reason = str(error.__cause__ or error).split("\n")[0].rstrip(".")
     return MapError(f"{path} cannot be read as a raster: {reason}; check that it is one, and whole")
@@ -66,8 +69,6 @@ def _read_band(source: LayerSource) -> tuple[Raster, str]:
     import rasterio
     from rasterio.errors import RasterioError
 
-    if not source.path.exists():
-        raise MapError(f"{source.path} does not exist; check the path")
     try:
         with rasterio.open(source.path) as dataset:
             if not 1 <= source.band <= dataset.count:
@@ -77,11 +78,12 @@ def _read_band(source: LayerSource) -> tuple[Raster, str]:
                 )
             data = dataset.read(source.band, masked=True)
             values = np.ma.filled(data.astype(np.float64), np.nan)
+            values = values * dataset.scales[source.band - 1] + dataset.offsets[source.band - 1]
             values[~np.isfinite(values)] = np.nan
             raster = Raster(values[None], dataset.transform, parse_crs(dataset.crs))
             return raster, dataset.units[source.band - 1] or ""
     except (RasterioError, OSError) as error:
-        raise _damaged(source.path, error) from None
+        raise _unreadable(source.path, error) from None
 
 
 def _descriptions(dataset: Any) -> list[tuple[int, str | None]]:
@@ -117,7 +119,9 @@ def _onto(raster: Raster, base: Raster) -> Array:
 
 def _height_unit(unit: str, crs: CRS | None) -> str:
     """The unit that the file names, else metres where the plane is in metres."""
-    return unit or ("m" if crs is not None else "")
+    if unit or crs is None:
+        return unit
+    return "m" if Georeference(crs, crs).unit == "m" else ""
 
 
 def read_surface(

@@ -7,6 +7,7 @@ from typing import Literal
 
 from ..problem import Problem, Solution
 from ..validation import (
+    require_bool,
     require_choice,
     require_count,
     require_fraction,
@@ -55,6 +56,7 @@ class RRTStar:
         require_positive(radius_factor=self.radius_factor)
         require_fraction(goal_bias=self.goal_bias)
         require_seed(self.seed)
+        require_bool(informed=self.informed, prune=self.prune)
         require_choice(("riemannian", "chord"), metric=self.metric)
         optional = {
             "step": self.step,

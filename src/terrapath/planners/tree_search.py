@@ -107,6 +107,7 @@ class _Search:
         return int(self.tree.counters[kernels.SAMPLES])
 
     def note(self) -> Progress:
+        """Enter the state into the history and return it."""
         progress = Progress(self.samples, self.options.samples, self.seconds, self.best_cost)
         self.rows.append((progress.samples, progress.seconds, progress.best_cost))
         return progress
@@ -124,7 +125,7 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
     if callback is not None and callback(progress):
         return "callback"
     if math.isfinite(progress.best_cost) and progress.best_cost <= options.target_length:
-        return "target length"
+        return "first path" if math.isinf(options.target_length) else "target length"
     if options.time_limit is not None and progress.seconds >= options.time_limit:
         return "time limit"
     if progress.samples >= options.samples:
@@ -136,7 +137,7 @@ def _run(search: _Search, callback: Callback | None) -> str:
     """Grow the tree until there is a reason to stop, and return it.
 
     The random numbers are one stream whatever the chunks, so how often the clock is
-    looked at changes nothing in the result.
+    looked at changes nothing in the tree that a number of samples gives.
     """
     random = np.random.Generator(np.random.PCG64(search.options.seed))
     try:
@@ -146,6 +147,7 @@ def _run(search: _Search, callback: Callback | None) -> str:
             if reason := _reason_to_stop(search, callback):
                 return reason
     except KeyboardInterrupt:
+        search.note()  # what the kernel had done when the signal was seen
         return "interrupt"
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import MapError
 from ..files import written_whole
 from ..problem import Solution
@@ -12,6 +14,7 @@ from .map_view import draw_map
 from .perspective import draw_perspective
 
 DOTS_PER_INCH = 140
+PANEL_WIDTH = 5.4  # inches
 FORMATS = (".png", ".svg", ".pdf", ".jpg")
 
 
@@ -34,7 +37,9 @@ def draw_route(solution: Solution) -> Any:
     """A matplotlib figure: the map with tree and path beside the surface in 3-D."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14.0, 6.2), layout="constrained")
+    bounds = solution.problem.bounds
+    height = float(np.clip(PANEL_WIDTH * bounds.height / bounds.width, 3.8, 8.0)) + 0.8
+    figure = Figure(figsize=(14.0, height), layout="constrained")
     panels = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.05))
     draw_map(figure.add_subplot(panels[0]), solution)
     draw_perspective(figure.add_subplot(panels[1], projection="3d"), solution)

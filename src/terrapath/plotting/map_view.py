@@ -11,6 +11,7 @@ from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.patches import Circle as Disc
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
+from scipy.ndimage import gaussian_filter
 from shapely import LineString, Polygon
 
 from ..problem import Problem, Solution
@@ -19,6 +20,8 @@ from .terrain import LAYER_COLOURS, Terrain, height_colours, label_axes
 SAMPLES = 500
 CONTOURS = 14
 LAYER_CONTOURS = 5
+# In samples: without it the steps of a quantised layer draw a maze instead of contours.
+LAYER_SMOOTHING = 8.0
 PATH_COLOUR = "#e4002b"
 OBSTACLE_STYLE: dict[str, Any] = {"facecolor": "#3b3b3b", "edgecolor": "black", "linewidth": 0.8}
 
@@ -37,8 +40,8 @@ def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain) -> None:
     axes.add_collection(PatchCollection([*patches, *discs], zorder=3, **OBSTACLE_STYLE))
     walls = [np.asarray(g.coords) for g in space.geometries if isinstance(g, LineString)]
     axes.add_collection(LineCollection(walls, colors="black", linewidths=2.0, zorder=3))
-    if terrain.blocked.any():
-        shown = np.where(terrain.blocked[..., None], [0.23, 0.23, 0.23, 0.9], 0.0)
+    if terrain.masked.any():
+        shown = np.where(terrain.masked[..., None], [0.23, 0.23, 0.23, 0.9], 0.0)
         axes.imshow(shown, extent=_extent(problem), origin="lower", zorder=3)
 
 
@@ -51,11 +54,12 @@ def _draw_contours(axes: Any, terrain: Terrain) -> None:
     """Heights in black, the second layer, where there is one, in its colours."""
     heights, *others = terrain.values
     if np.ptp(heights) > 0.0:
-        style = {"colors": "black", "linewidths": 0.45, "alpha": 0.45}
+        style = {"colors": "black", "linewidths": 0.45, "alpha": 0.45, "linestyles": "solid"}
         axes.contour(terrain.x, terrain.y, heights, CONTOURS, **style)
     if others and np.ptp(others[0]) > 0.0:
         style = {"cmap": LAYER_COLOURS, "linewidths": 0.8, "alpha": 0.9}
-        axes.contour(terrain.x, terrain.y, others[0], LAYER_CONTOURS, **style)
+        smooth = gaussian_filter(others[0], LAYER_SMOOTHING)
+        axes.contour(terrain.x, terrain.y, smooth, LAYER_CONTOURS, **style)
 
 
 def _draw_tree(axes: Any, solution: Solution) -> None:

@@ -110,7 +110,7 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     exaggeration = RELIEF * longer / (high - low)
     if problem.surface.unit == problem.surface.layers[0].unit and exaggeration > 1.05:
         axes.text2D(
-            0.02, 0.02, f"heights drawn {exaggeration:.1f} times", transform=axes.transAxes, size=8
+            0.02, 0.95, f"heights drawn {exaggeration:.1f} times", transform=axes.transAxes, size=8
         )
 
 

@@ -7,6 +7,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+import shapely
 from matplotlib import colormaps
 from matplotlib.colors import LightSource, Normalize
 from matplotlib.ticker import FuncFormatter
@@ -43,7 +45,19 @@ class Terrain:
         return cls(problem, x, y, np.moveaxis(problem.surface.values(points), -1, 0))
 
     @cached_property
-    def blocked(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def blocked(self) -> npt.NDArray[np.bool_]:
+        """(ny, nx): samples that are not free."""
+        space = self.problem.free_space
+        x, y = np.meshgrid(self.x, self.y)
+        found = self.masked.copy()
+        for circle in space.circles:
+            found |= np.hypot(x - circle.x1, y - circle.x2) <= circle.radius
+        for geometry in space.geometries:
+            found |= shapely.contains_xy(geometry, x, y)
+        return found
+
+    @cached_property
+    def masked(self) -> npt.NDArray[np.bool_]:
         """(ny, nx): samples in a mask's blocked cells."""
         found = np.zeros((len(self.y), len(self.x)), bool)
         for mask in self.problem.free_space.masks:
@@ -63,7 +77,7 @@ class Terrain:
 
     def norm(self, layer: int) -> Normalize:
         """Colour scale over the part of a layer that is not blocked."""
-        values = self.values[layer][~self.blocked]
+        values = self.values[layer][~self.masked]
         low, high = float(values.min()), float(values.max())
         return Normalize(low, high if high > low else low + 1.0)
 

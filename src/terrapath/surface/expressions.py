@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import sympy
+from sympy.core.function import AppliedUndef
 from sympy.parsing.sympy_parser import parse_expr
 
 from ..errors import InputError
@@ -28,6 +29,11 @@ def _parse(text: str) -> sympy.Expr:
         raise InputError(
             f"expression {text!r} has the unknown names {unknown}; the variables are x1 and x2"
         )
+    if expression.has(AppliedUndef, sympy.I):
+        raise InputError(
+            f"expression {text!r} is not a real formula of known functions; "
+            "write it in x1 and x2 with SymPy's functions, as in exp(-x1**2)"
+        )
     return expression
 
 
@@ -35,8 +41,10 @@ def _array_function(expressions: Sequence[sympy.Expr]) -> Callable[[Array, Array
     functions: list[Any] = [sympy.lambdify((X1, X2), e, "numpy") for e in expressions]
 
     def evaluate(x: Array, y: Array) -> Array:
-        # A constant expression gives a scalar whatever the arrays.
-        return np.stack([np.broadcast_to(f(x, y), x.shape) for f in functions])
+        # A constant expression gives a scalar whatever the arrays. What is not finite is
+        # found, and its place named, by the fit.
+        with np.errstate(all="ignore"):
+            return np.stack([np.broadcast_to(f(x, y), x.shape) for f in functions])
 
     return evaluate
 

@@ -22,6 +22,8 @@ Gradient = Callable[[Array, Array], Array]
 FIRST_SAMPLES = 33  # a side, the coarsest grid that a function is tried on
 MOST_SAMPLES = 4097  # a side, the finest
 TEST_POINTS = 8192
+DIFFERENCES_PER_CELL = 64.0  # the step of the differences that gradients are checked with
+SAFETY = 0.5  # a fit is taken at this share of the tolerance: no test point is the worst one
 COARSE_TOLERANCE = 1e-3  # share of a layer's range that counts as "the shape is seen"
 MOST_RESAMPLING = 8  # how many times finer a non-uniform axis may become
 
@@ -104,9 +106,9 @@ def _checked(f: Function, x: Array, y: Array) -> Array:
     return values
 
 
-def _difference_gradient(f: Function, bounds: Bounds, step: float) -> Gradient:
+def _difference_gradient(f: Function, step: float) -> Gradient:
     """Sixth-order central differences of f."""
-    weights = {1: 3.0 / 4.0, 2: -3.0 / 20.0, 3: 1.0 / 60.0}
+    weights = {1: 3.0 / 4.0, 2: -3.0 / 20.0, 3: 1.0 / 60.0}  # of f(+k step) - f(-k step)
 
     def gradient(x: Array, y: Array) -> Array:
         along_x = sum(
@@ -122,12 +124,55 @@ def _difference_gradient(f: Function, bounds: Bounds, step: float) -> Gradient:
     return gradient
 
 
+def _exact_gradient(gradient: Gradient, layers: int) -> Gradient:
+    """A user's gradient, its answer checked: (2, layers, ...), finite."""
+
+    def checked(x: Array, y: Array) -> Array:
+        slopes = np.asarray(gradient(x, y), dtype=np.float64)
+        if slopes.shape == (2, *x.shape) and layers == 1:
+            slopes = slopes[:, None]
+        if slopes.shape != (2, layers, *x.shape):
+            raise InputError(
+                f"gradient returned shape {slopes.shape} for arrays of shape {x.shape}; "
+                f"it must return {(2, layers, *x.shape)}: d/dx1 and d/dx2 of each layer"
+            )
+        if not np.isfinite(slopes).all():
+            place = tuple(np.argwhere(~np.isfinite(slopes))[0][2:])
+            raise InputError(
+                f"gradient is not finite at x1={x[place]:g}, x2={y[place]:g}; "
+                "shrink the bounds to where it is defined"
+            )
+        return slopes
+
+    return checked
+
+
 def _test_points(bounds: Bounds, margin: float) -> tuple[Array, Array]:
-    """Points spread evenly (Sobol, scrambled, seed 0), off every grid, inside a margin."""
-    unit = qmc.Sobol(2, seed=0).random(TEST_POINTS)
-    x = bounds.x1_min + margin + unit[:, 0] * (bounds.width - 2.0 * margin)
-    y = bounds.x2_min + margin + unit[:, 1] * (bounds.height - 2.0 * margin)
+    """Points off every grid (Sobol, scrambled, seed 0) inside a margin, some on its edges."""
+    u, v = qmc.Sobol(2, seed=0).random(TEST_POINTS).T
+    edge = TEST_POINTS // 32  # points on each edge, where splines are at their worst
+    u[:edge], u[edge : 2 * edge] = 0.0, 1.0
+    v[2 * edge : 3 * edge], v[3 * edge : 4 * edge] = 0.0, 1.0
+    x = bounds.x1_min + margin + u * (bounds.width - 2.0 * margin)
+    y = bounds.x2_min + margin + v * (bounds.height - 2.0 * margin)
     return x, y
+
+
+def _errors(
+    f: Function, gradient: Gradient | None, spline: Spline, bounds: Bounds
+) -> tuple[Array, float]:
+    """Largest errors at the test points: of each layer's value, and of any gradient."""
+    layers = len(spline.weights)
+    step = min(spline.dx, spline.dy) / DIFFERENCES_PER_CELL
+    if gradient is None:
+        slope, margin = _difference_gradient(f, step), 3.0 * step
+    else:
+        slope, margin = _exact_gradient(gradient, layers), 0.0
+    x, y = _test_points(bounds, margin)
+    jets = np.empty((TEST_POINTS, layers, 6))
+    fill_jets(spline, np.column_stack([x, y]), jets)
+    value_errors: Array = np.abs(jets[..., 0].T - _checked(f, x, y)).max(axis=1)
+    return value_errors, float(np.abs(jets[..., 1:3].T - slope(x, y)).max())
 
 
 def fit_function(
@@ -139,23 +184,15 @@ def fit_function(
     while True:
         x = np.linspace(bounds.x1_min, bounds.x1_max, samples)
         y = np.linspace(bounds.x2_min, bounds.x2_max, samples)
-        grid_x, grid_y = np.meshgrid(x, y)
-        values = _checked(f, grid_x, grid_y)
+        values = _checked(f, *np.meshgrid(x, y))
         spline = interpolate(values, x, y, np.ones(len(values)))
-        step = min(spline.dx, spline.dy) / 4.0
-        slope = gradient or _difference_gradient(f, bounds, step)
-        px, py = _test_points(bounds, 0.0 if gradient else 3.0 * step)
-        jets = np.empty((TEST_POINTS, len(values), 6))
-        fill_jets(spline, np.column_stack([px, py]), jets)
-        value_error = np.abs(jets[..., 0].T - _checked(f, px, py)).max(axis=1)
-        gradient_error = float(np.abs(jets[..., 1:3].T - slope(px, py)).max())
+        value_errors, gradient_error = _errors(f, gradient, spline, bounds)
+        worst, spacing = float(value_errors.max()), max(spline.dx, spline.dy)
         spread = values.max(axis=(1, 2)) - values.min(axis=(1, 2))
-        if resolution is None and (value_error <= COARSE_TOLERANCE * spread).all():
-            resolution = max(spline.dx, spline.dy)
-        worst = float(value_error.max())
-        if max(worst, gradient_error) <= tolerance:
-            finest = max(spline.dx, spline.dy)
-            return FunctionFit(spline, samples, worst, gradient_error, resolution or finest)
+        if resolution is None and (value_errors <= COARSE_TOLERANCE * spread).all():
+            resolution = spacing
+        if max(worst, gradient_error) <= SAFETY * tolerance:
+            return FunctionFit(spline, samples, worst, gradient_error, resolution or spacing)
         if samples >= MOST_SAMPLES:
             raise FitError(
                 f"tolerance={tolerance:g} is not met on {samples} x {samples} samples: "

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 from pyproj import CRS, Transformer
+from pyproj.crs import ProjectedCRS
+from pyproj.crs.coordinate_operation import TransverseMercatorConversion
 from pyproj.exceptions import CRSError
 
 from ..errors import MapError
@@ -15,20 +17,13 @@ from ..validation import Array
 
 
 def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
-    """Transverse Mercator in metres, true to scale at the given point of the same body.
+    """Transverse Mercator in metres, true to scale at the given point of a geographic CRS.
 
     Conformal, so directions and slopes are right, and unlike UTM without a scale factor:
-    30 km from the centre lengths are off by 1e-5.
+    30 km from the centre lengths are off by 1e-5. The datum stays the map's own.
     """
-    ellipsoid = map_crs.ellipsoid
-    if ellipsoid is None:
-        raise MapError(f"the CRS {map_crs.name!r} has no ellipsoid; assign a geographic CRS")
-    a, b = ellipsoid.semi_major_metre, ellipsoid.semi_minor_metre
-    datum = "+datum=WGS84" if map_crs.to_epsg() == 4326 else f"+a={a!r} +b={b!r}"
-    return CRS.from_proj4(
-        f"+proj=tmerc +lat_0={latitude:.6f} +lon_0={longitude:.6f} +k=1 +x_0=0 +y_0=0 "
-        f"{datum} +units=m +no_defs"
-    )
+    centre = TransverseMercatorConversion(round(latitude, 6), round(longitude, 6))
+    return ProjectedCRS(centre, name="local transverse Mercator", geodetic_crs=map_crs)
 
 
 @dataclass(frozen=True)
@@ -66,7 +61,7 @@ class Georeference:
         """What the plane is, for people."""
         if self.crs == self.map_crs:
             return str(self.crs.name)
-        return f"local transverse Mercator of {self.map_crs.name}"
+        return f"{self.crs.name} on {self.map_crs.name}"
 
     @cached_property
     def _to_map(self) -> Transformer:

@@ -51,13 +51,3 @@ class Mask:
         dx = (self.x[-1] - self.x[0]) / (len(self.x) - 1)
         dy = (self.y[-1] - self.y[0]) / (len(self.y) - 1)
         return float(dx), float(dy)
-
-    def covers(self, x1: float, x2: float) -> bool:
-        """Does the point lie in a blocked cell?"""
-        dx, dy = self.spacing
-        column, row = (x1 - self.x[0]) / dx + 0.5, (x2 - self.y[0]) / dy + 0.5
-        rows, columns = self.blocked.shape
-        if not (0 <= column <= columns and 0 <= row <= rows):
-            return False
-        i, j = min(int(column), columns - 1), min(int(row), rows - 1)
-        return bool(self.blocked[j, i])

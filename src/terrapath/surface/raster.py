@@ -55,9 +55,14 @@ class Raster:
         """Is it in degrees or turned, so that it cannot be planned on as it is?"""
         return not self.is_north_up or (self.crs is not None and self.crs.is_geographic)
 
+    def _place(self, column: float, row: float) -> tuple[float, float]:
+        """Map coordinates of the corner between cells."""
+        t = self.transform
+        return t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
+
     def _extent(self) -> tuple[float, float, float, float]:
         rows, columns = self.bands.shape[1:]
-        corners = [self.transform @ c for c in ((0, 0), (columns, 0), (0, rows), (columns, rows))]
+        corners = [self._place(c, r) for c in (0, columns) for r in (0, rows)]
         x, y = zip(*corners, strict=True)
         return min(x), min(y), max(x), max(y)
 
@@ -100,7 +105,9 @@ class Raster:
             return self
         rows, columns = (np.flatnonzero(np.any(some, axis=axis)) for axis in (1, 0))
         window = np.s_[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        transform = self.transform @ Affine.translation(columns[0], rows[0])
+        x, y = self._place(columns[0], rows[0])
+        t = self.transform
+        transform = Affine(t.a, t.b, x, t.d, t.e, y)
         return Raster(self.bands[window], transform, self.crs, self.map_crs)
 
     def _georeference(self) -> Georeference | None:

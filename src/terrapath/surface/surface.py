@@ -68,9 +68,9 @@ def _make_layers(
     weights: Sequence[float] | None,
 ) -> tuple[Layer, ...]:
     """Layers with defaults: the first is the height, the others are numbered as x_k."""
-    names = names or ["height", *(f"x{k}" for k in range(4, count + 3))]
-    units = units or [""] * count
-    weights = weights or [1.0] * count
+    names = ["height", *(f"x{k}" for k in range(4, count + 3))] if names is None else names
+    units = [""] * count if units is None else units
+    weights = [1.0] * count if weights is None else weights
     for what, given in (("names", names), ("units", units), ("weights", weights)):
         if len(given) != count:
             raise InputError(f"{what} has {len(given)} entries for {count} layers; give one each")
@@ -114,11 +114,14 @@ class Surface:
 
         layers : for each layer its peaks (amplitude, falloff, x1, x2), each the function
         amplitude * exp(-falloff * r^2); amplitude in the layer's unit, falloff > 0 in
-        1/map unit^2. Source: the surfaces of the paper's section 5.
+        1/map unit^2. A layer without peaks is flat. Source: the surfaces of the paper's section 5.
         """
         if len(layers) == 0:
             raise InputError("layers is empty; a surface needs at least one layer")
-        rows = [as_array(peaks, f"layers[{k}]", shape=(None, 4)) for k, peaks in enumerate(layers)]
+        rows = [
+            as_array(peaks if len(peaks) else np.empty((0, 4)), f"layers[{k}]", shape=(None, 4))
+            for k, peaks in enumerate(layers)
+        ]
         peaks = np.concatenate(rows)
         if len(peaks) and peaks[:, 1].min() <= 0.0:
             raise InputError(

@@ -1,0 +1,335 @@
+"""The command: results, outputs, exit codes, and one clear line for every bad input."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rasterio
+from rasterio.transform import from_origin
+
+import terrapath as tp
+from terrapath.cli.main import run
+
+FAST = ["--samples", "300"]
+
+
+@pytest.fixture
+def dem(tmp_path):
+    """A small raster in metres, a hill, with a block without data."""
+    y, x = np.mgrid[0:40, 0:50] * 10.0
+    height = 30.0 * np.exp(-((x - 250) ** 2 + (y - 200) ** 2) / 8000.0)
+    height[5:9, 5:9] = -9999.0
+    rocks = np.where(x > 250, 1.0, 0.0)
+    path = tmp_path / "dem.tif"
+    profile = {
+        "driver": "GTiff",
+        "width": 50,
+        "height": 40,
+        "count": 2,
+        "dtype": "float64",
+        "crs": "EPSG:32617",
+        "transform": from_origin(500_000.0, 4_000_400.0, 10.0, 10.0),
+        "nodata": -9999.0,
+    }
+    with rasterio.open(path, "w", **profile) as dataset:
+        dataset.write(height, 1)
+        dataset.write(rocks, 2)
+    return path
+
+
+ENDS = ["--start", "500100,4000100", "--goal", "500400,4000300"]
+
+
+def json_of(capsys, *arguments):
+    code = run(["plan", *arguments, "--json"])
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return code, json.loads(captured.out)
+
+
+def test_json_has_the_promised_keys_and_the_path_is_as_long_as_it_says(capsys):
+    code, answer = json_of(capsys, "six-peaks", *FAST, "--seed", "4")
+    assert code == 0
+    promised = [
+        "status",
+        "planner",
+        "length",
+        "cost",
+        "lower_bound",
+        "gap",
+        "seconds",
+        "samples",
+        "seed",
+        "start",
+        "goal",
+        "path",
+    ]
+    assert set(promised) <= set(answer)
+    assert answer["status"] == "solved"
+    assert answer["planner"] == "rrt-star-r"
+    assert answer["seed"] == 4
+    assert answer["samples"] == 300
+    assert answer["path"][0] == answer["start"] == [0.0, 0.0]
+    assert answer["path"][-1] == answer["goal"] == [10.0, 10.0]
+    surface = tp.scenes.load("six-peaks").surface
+    assert tp.curve_length(surface, answer["path"]) == pytest.approx(answer["length"], rel=1e-9)
+
+
+def test_the_command_and_the_library_give_the_same_route(capsys):
+    _, answer = json_of(
+        capsys, "one-peak", *FAST, "--seed", "2", "--step", "0.7", "--uniform", "--planner",
+        "rrt-star",
+    )  # fmt: skip
+    planner = tp.RRTStar(samples=300, seed=2, step=0.7, informed=False, metric="chord")
+    solution = planner.solve(tp.scenes.load("one-peak"))
+    assert answer["path"] == solution.path.points.tolist()
+    assert answer["cost"] == solution.cost
+
+
+def test_start_and_goal_can_be_given_and_equal_ends_give_a_path_of_length_zero(capsys):
+    code, answer = json_of(capsys, "one-peak", "--start", "2,3", "--goal", "2,3")
+    assert code == 0
+    assert answer["length"] == 0.0
+    assert answer["path"] == [[2.0, 3.0], [2.0, 3.0]]
+
+
+def test_the_table_shows_what_was_asked_for(capsys):
+    assert run(["plan", "three-peaks", *FAST]) == 0
+    table = capsys.readouterr().out
+    for word in ("status", "true length", "straight-line length", "climb", "samples", "seconds"):
+        assert word in table
+    assert "edges pruned" in " ".join(table.split())
+
+
+def test_jacksboro_answers_in_metres_and_in_degrees(capsys):
+    code, answer = json_of(capsys, "jacksboro", "--samples", "2000")
+    assert code == 0
+    assert answer["unit"] == "m"
+    assert answer["start_lonlat"] == pytest.approx(tp.scenes.JACKSBORO_START, abs=1e-9)
+    assert answer["goal_lonlat"] == pytest.approx(tp.scenes.JACKSBORO_GOAL, abs=1e-9)
+    from pyproj import Geod
+
+    geod = Geod(ellps="WGS84")
+    on_earth = geod.line_length(*np.array(answer["path_lonlat"]).T)
+    on_plane = np.hypot(*np.diff(answer["path"], axis=0).T).sum()
+    assert on_plane == pytest.approx(on_earth, rel=1e-5)
+    assert on_plane < answer["length"] <= answer["straight_length"]
+
+
+def test_degrees_are_taken_for_jacksboro(capsys):
+    code, answer = json_of(
+        capsys, "jacksboro", "--samples", "2000", "--start", "-84.2,36.5", "--goal", "-84.15,36.6"
+    )
+    assert code == 0
+    assert answer["start_lonlat"] == pytest.approx([-84.2, 36.5], abs=1e-9)
+
+
+def test_a_raster_with_layers_is_planned_and_written_in_every_format(dem, tmp_path, capsys):
+    outputs = [tmp_path / f"route{suffix}" for suffix in (".geojson", ".csv", ".json", ".png")]
+    arguments = [str(dem), *ENDS, *FAST, "--layer", f"rocks={dem}:2*50", "--plot", str(outputs[3])]
+    for path in outputs[:3]:
+        arguments += ["--output", str(path)]
+    code, answer = json_of(capsys, *arguments)
+    assert code == 0
+    assert answer["layers"] == {"height": 1.0, "rocks": 50.0}
+    assert json.loads(outputs[2].read_text())["path"] == answer["path"]
+    feature = json.loads(outputs[0].read_text())["features"][0]
+    assert feature["geometry"]["coordinates"] == answer["path_lonlat"]
+    assert feature["properties"]["length"] == answer["length"]
+    header, *rows = outputs[1].read_text().splitlines()
+    assert header == "distance,x1,x2,longitude,latitude,height [m],rocks"
+    assert float(rows[-1].split(",")[0]) == pytest.approx(answer["length"], rel=1e-9)
+    assert outputs[3].read_bytes().startswith(b"\x89PNG")
+
+
+def test_weights_change_the_route(dem, capsys):
+    _, plain = json_of(capsys, str(dem), *ENDS, "--samples", "3000")
+    _, steep = json_of(capsys, str(dem), *ENDS, "--samples", "3000", "--weight", "height=20")
+    assert steep["climb"] < 0.5 * plain["climb"]
+
+
+def bad(capsys, arguments, *words, code=2):
+    """Run, and see one line on standard error that holds all the words."""
+    assert run(["plan", *arguments]) == code
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("terrapath: ")
+    assert captured.err.count("\n") == 1
+    assert "Traceback" not in captured.err
+    for word in words:
+        assert word in captured.err, captured.err
+
+
+BAD_ARGUMENTS = {
+    "nothing": ([], "WHERE"),
+    "unknown scene": (["nowhere"], "nowhere", "six-peaks"),
+    "missing file": (["missing.tif", "--start", "0,0", "--goal", "1,1"], "missing.tif", "exist"),
+    "start off the map": (["six-peaks", "--start", "20,3"], "start=(20, 3)", "x1 in [-1, 11]"),
+    "goal off the map": (["six-peaks", "--goal", "3,-20"], "goal=(3, -20)", "x2 in [-1, 11]"),
+    "one coordinate": (["six-peaks", "--start", "1"], "start='1'", "X,Y"),
+    "three coordinates": (["six-peaks", "--goal", "1,2,3"], "goal='1,2,3'", "X,Y"),
+    "words": (["six-peaks", "--goal", "a,b"], "goal='a,b'", "X,Y"),
+    "NaN": (["six-peaks", "--start", "nan,2"], "start=(nan, 2)", "finite"),
+    "infinity": (["six-peaks", "--start", "1,inf"], "start=(1, inf)", "finite"),
+    "negative samples": (["six-peaks", "--samples", "-5"], "samples=-5", "1 to"),
+    "no samples": (["six-peaks", "--samples", "0"], "samples=0"),
+    "worded samples": (["six-peaks", "--samples", "many"], "--samples"),
+    "negative step": (["six-peaks", "--step", "-1"], "step=-1", "above 0"),
+    "NaN step": (["six-peaks", "--step", "nan"], "step=nan"),
+    "negative seed": (["six-peaks", "--seed", "-1"], "seed=-1"),
+    "bias above one": (["six-peaks", "--goal-bias", "2"], "goal_bias=2"),
+    "no time": (["six-peaks", "--time-limit", "0"], "time_limit=0"),
+    "unknown planner": (["six-peaks", "--planner", "rtt"], "'rtt'", "rrt-star-r"),
+    "option of another planner": (
+        ["six-peaks", "--planner", "rrt", "--radius-factor", "2"],
+        "radius_factor",
+        "rrt",
+    ),
+    "misspelt option": (["six-peaks", "--plannr", "rrt"], "--plannr", "--planner"),
+    "layer on a scene": (["six-peaks", "--layer", "a=b.tif"], "--layer", "six-peaks"),
+    "unknown weight": (["six-peaks", "--weight", "foo=3"], "foo", "resistance"),
+    "negative weight": (["six-peaks", "--weight", "height=-3"], "height=-3"),
+    "malformed weight": (["six-peaks", "--weight", "height"], "NAME=WEIGHT"),
+    "degrees in the wrong order": (["jacksboro", "--start", "36.5,-84.2"], "longitude -84.4"),
+    "unknown format": (["six-peaks", "--output", "x.shp"], "x.shp", ".geojson"),
+    "unknown picture": (["six-peaks", "--plot", "x.bmp"], "x.bmp", ".png"),
+    "no directory": (["six-peaks", "--output", "no/where.csv"], "no/where.csv", "directory"),
+    "same file twice": (["six-peaks", "--output", "a.csv", "--output", "a.csv"], "twice"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_ARGUMENTS)
+def test_bad_arguments_give_one_clear_line(name, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments, *words = BAD_ARGUMENTS[name]
+    bad(capsys, arguments, *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+BAD_MAPS = {
+    "no start": (["--goal", "500400,4000300"], "start is missing", "--start X,Y"),
+    "off the map": (["--start", "1,2", "--goal", "500400,4000300"], "start=(1, 2)", "x1 in"),
+    "in no-data": (["--start", "500070,4000330", "--goal", "500400,4000300"], "no-data"),
+    "missing band": ([*ENDS, "--height-band", "7"], "band=7", "dem.tif"),
+    "malformed layer": ([*ENDS, "--layer", "rocks"], "NAME=FILE"),
+    "malformed layer weight": ([*ENDS, "--layer", "rocks=dem.tif:2*x"], "FILE[:BAND][*WEIGHT]"),
+    "layer twice": ([*ENDS, "--layer", "a=dem.tif", "--layer", "a=dem.tif"], "twice"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_MAPS)
+def test_bad_questions_about_a_map_give_one_clear_line(name, dem, capsys, monkeypatch):
+    monkeypatch.chdir(dem.parent)
+    arguments, *words = BAD_MAPS[name]
+    bad(capsys, ["dem.tif", *arguments], *words)
+
+
+def test_damaged_files_give_one_clear_line(dem, tmp_path, capsys):
+    damaged = tmp_path / "damaged.tif"
+    damaged.write_bytes(dem.read_bytes()[:9000])
+    bad(capsys, [str(damaged), *ENDS], "damaged.tif", "cannot be read")
+    text = tmp_path / "text.tif"
+    text.write_text("this is no raster")
+    bad(capsys, [str(text), *ENDS], "text.tif", "cannot be read")
+    bad(capsys, [str(tmp_path), *ENDS], "cannot be read")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_write_protected_directory_is_found_out_before_planning(tmp_path, capsys):
+    tmp_path.chmod(0o500)
+    bad(capsys, ["six-peaks", "--output", str(tmp_path / "a.csv")], "cannot be written")
+
+
+def test_an_existing_file_survives_a_refused_command(tmp_path, capsys):
+    kept = tmp_path / "kept.csv"
+    kept.write_text("precious")
+    bad(capsys, ["six-peaks", "--output", str(kept), "--start", "99,99"], "start=(99, 99)")
+    assert kept.read_text() == "precious"
+
+
+def test_no_path_within_the_limits_exits_with_3_and_writes_nothing(tmp_path, capsys):
+    output = tmp_path / "a.geojson"
+    arguments = ["six-peaks", "--samples", "20", "--step", "0.1", "--output", str(output)]
+    assert run(["plan", *arguments]) == 3
+    captured = capsys.readouterr()
+    assert "not-found" in captured.out
+    assert "no path was found" in captured.err
+    assert list(tmp_path.iterdir()) == []
+    code, answer = json_of(capsys, *arguments)
+    assert code == 3
+    assert answer["status"] == "not-found"
+    assert answer["path"] is None
+    assert answer["length"] is None
+
+
+def test_an_enclosed_goal_exits_with_3(tmp_path, capsys):
+    heights = np.zeros((40, 40))
+    heights[8:20, 8:20] = -9999.0
+    heights[12:16, 12:16] = 0.0
+    path = tmp_path / "moat.tif"
+    profile = {"driver": "GTiff", "width": 40, "height": 40, "count": 1, "dtype": "float64"}
+    profile |= {"transform": from_origin(0.0, 40.0, 1.0, 1.0), "crs": "EPSG:32617"}
+    with rasterio.open(path, "w", nodata=-9999.0, **profile) as dataset:
+        dataset.write(heights, 1)
+    assert run(["plan", str(path), "--start", "35,5", "--goal", "14,26", *FAST]) == 3
+    assert "enclosed" in capsys.readouterr().err
+
+
+def test_ctrl_c_exits_with_130_and_writes_the_best_so_far(tmp_path):
+    output = tmp_path / "best.json"
+    program = (
+        "import signal, sys, threading, time\n"
+        "from terrapath.planners import tree_search\n"
+        "from terrapath.cli.main import run\n"
+        "seen = tree_search._reason_to_stop\n"
+        "def interrupt(search, callback):\n"
+        "    if search.samples >= 2048: signal.raise_signal(signal.SIGINT)\n"
+        "    return seen(search, callback)\n"
+        "tree_search._reason_to_stop = interrupt\n"
+        f"sys.exit(run(['plan', 'six-peaks', '--samples', '100000', '--output', {str(output)!r}]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 128 + signal.SIGINT
+    assert "Traceback" not in done.stderr
+    answer = json.loads(output.read_text())
+    assert answer["status"] == "interrupted"
+    assert answer["samples"] == 2048
+    assert answer["length"] > 17.018129
+
+
+def test_scenes_lists_every_scene(capsys):
+    assert run(["scenes"]) == 0
+    listed = capsys.readouterr().out
+    for name in tp.scenes.names():
+        assert name in listed
+
+
+def test_help_and_version_need_no_heavy_import():
+    program = (
+        "import sys\n"
+        "from terrapath.cli.main import run\n"
+        "assert run(['--version']) == 0\n"
+        "assert run(['--help']) == 0\n"
+        "assert run(['plan', '--help']) == 0\n"
+        "heavy = {'numba', 'numpy', 'scipy', 'matplotlib', 'rasterio', 'shapely', 'sympy'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert tp.__version__ in done.stdout
+    assert "terrapath" in done.stdout
+
+
+def test_the_installed_script_answers():
+    script = Path(sys.executable).with_name("terrapath")
+    done = subprocess.run([script, "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"terrapath {tp.__version__}"

@@ -1,0 +1,115 @@
+"""Routes as files: right in content, whole or not there at all."""
+
+import csv
+import json
+import shutil
+
+import numpy as np
+import pytest
+import shapely
+
+import terrapath as tp
+from terrapath.files import require_writable, written_whole
+
+
+@pytest.fixture(scope="module")
+def solution():
+    return tp.RRTStar(samples=1000).solve(tp.scenes.load("jacksboro"))
+
+
+def test_geojson_is_read_by_shapely_as_the_same_line(solution, tmp_path):
+    tp.write_route(solution, tmp_path / "route.geojson")
+    line = shapely.get_parts(shapely.from_geojson((tmp_path / "route.geojson").read_text()))[0]
+    reference = solution.problem.surface.georeference
+    back = reference.from_map(shapely.get_coordinates(line))
+    assert np.abs(back - solution.path.points).max() < 1e-3  # a millimetre
+
+
+def test_geojson_without_crs_keeps_the_plane(tmp_path):
+    solution = tp.RRTStar(samples=300).solve(tp.scenes.load("one-peak"))
+    tp.write_route(solution, tmp_path / "route.geojson")
+    feature = json.loads((tmp_path / "route.geojson").read_text())["features"][0]
+    assert feature["geometry"]["coordinates"] == solution.path.points.tolist()
+    assert "without CRS" in feature["properties"]["coordinates"]
+
+
+def test_csv_is_the_profile(solution, tmp_path):
+    tp.write_route(solution, tmp_path / "route.csv")
+    with (tmp_path / "route.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    profile = solution.path.profile
+    assert [float(row["distance"]) for row in rows] == profile.distance.tolist()
+    assert [float(row["height [m]"]) for row in rows] == profile.values[:, 0].tolist()
+
+
+def test_the_profile_adds_up(solution):
+    profile = solution.path.profile
+    assert profile.distance[-1] == pytest.approx(solution.length, rel=1e-9)
+    rises = np.diff(profile.values[:, 0])
+    assert solution.path.climb == pytest.approx(rises[rises > 0].sum())
+    net = profile.values[-1, 0] - profile.values[0, 0]
+    assert solution.path.climb >= max(net, 0.0)
+
+
+def test_a_tilted_plane_is_climbed_by_its_slope():
+    surface = tp.Surface.from_function(lambda x, y: 0.3 * x, (0, 0, 10, 10))
+    path = tp.Problem(surface, (1, 1), (9, 5)).path([(1, 1), (9, 5)])
+    assert path.climb == pytest.approx(0.3 * 8, abs=1e-9)
+    assert path.length == pytest.approx(np.hypot(np.hypot(8, 4), 2.4), rel=1e-12)
+
+
+def test_lunar_routes_are_written_in_degrees_of_the_moon(tmp_path):
+    from pathlib import Path
+
+    lunar = Path(__file__).parents[2] / "shared" / "data" / "herodotus_mons.tif"
+    if not lunar.exists():
+        pytest.skip("the lunar map is not here")
+    surface = tp.read_surface(lunar, height_band=2)
+    solution = tp.RRTStar(samples=500).solve(tp.Problem(surface, (-5000, -3500), (5000, 3500)))
+    tp.write_route(solution, tmp_path / "route.geojson")
+    feature = json.loads((tmp_path / "route.geojson").read_text())["features"][0]
+    longitude, latitude = np.array(feature["geometry"]["coordinates"]).T
+    assert ((longitude > -53.3) & (longitude < -52.6)).all()
+    assert ((latitude > 27.2) & (latitude < 27.8)).all()
+    assert "WGS" not in feature["properties"]["coordinates"]
+
+
+def test_a_failure_while_writing_leaves_the_old_file_and_no_rest(tmp_path):
+    target = tmp_path / "route.csv"
+    target.write_text("old")
+
+    def fail():
+        with written_whole(target) as temporary:
+            temporary.write_text("half of the new")
+            raise RuntimeError("half")
+
+    with pytest.raises(RuntimeError, match="half"):
+        fail()
+    assert target.read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["route.csv"]
+
+
+def test_a_full_disk_is_told_in_one_line(tmp_path):
+    with (
+        pytest.raises(tp.MapError, match="could not be written"),
+        written_whole(tmp_path / "a.csv"),
+    ):
+        raise OSError(28, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_looking_whether_a_file_can_be_written_leaves_nothing(tmp_path):
+    require_writable(tmp_path / "new.csv")
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(tp.MapError, match="directory"):
+        require_writable(tmp_path)
+    with pytest.raises(tp.MapError, match="cannot be written"):
+        require_writable(tmp_path / "no" / "such.csv")
+
+
+def test_a_solution_without_a_path_is_not_written(tmp_path):
+    nothing = tp.RRTStar(samples=5, step=0.1).solve(tp.scenes.load("one-peak"))
+    with pytest.raises(tp.MapError, match="no path"):
+        tp.write_route(nothing, tmp_path / "route.csv")
+    shutil.rmtree(tmp_path / "none", ignore_errors=True)
+    assert list(tmp_path.iterdir()) == []
