@@ -6,7 +6,6 @@ import functools
 import itertools
 import math
 
-import networkx
 import numpy as np
 import shapely
 import sympy
@@ -180,32 +179,6 @@ def boxes_of_mask(mask):
 def mask_is_free_by_shapely(mask, a, b):
     """Do the closed segments touch no blocked cell?"""
     return segment_is_free_by_shapely(boxes_of_mask(mask), [], a, b)
-
-
-def visibility_graph_length(start, goal, polygons):
-    """Exact shortest path on flat ground among polygons, which may be grazed; inf where none.
-
-    Holes are ignored, so start and goal must lie outside. A shortest path turns only at
-    vertices, and a segment is allowed where it does not enter the inside of a polygon.
-    """
-    filled = [
-        shapely.Polygon(part.exterior)
-        for polygon in polygons
-        for part in shapely.get_parts(polygon)
-    ]
-    corners = {tuple(corner) for polygon in filled for corner in shapely.get_coordinates(polygon)}
-    start, goal = tuple(map(float, start)), tuple(map(float, goal))
-    nodes = [start, goal, *sorted(corners - {start, goal})]
-    graph = networkx.Graph()
-    graph.add_nodes_from(nodes)
-    for a, b in itertools.combinations(nodes, 2):
-        segment = shapely.LineString([a, b])
-        if not any(shapely.relate_pattern(segment, polygon, "T********") for polygon in filled):
-            graph.add_edge(a, b, weight=math.dist(a, b))
-    try:
-        return networkx.dijkstra_path_length(graph, start, goal)
-    except networkx.NetworkXNoPath:
-        return math.inf
 
 
 # Point sets

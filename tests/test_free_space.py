@@ -14,7 +14,6 @@ from oracles import (
     is_blocked,
     mask_is_free_by_shapely,
     segment_is_free_by_shapely,
-    visibility_graph_length,
 )
 from terrapath.validation import Bounds
 
@@ -452,17 +451,3 @@ def test_a_problem_takes_one_obstacle_or_many_and_the_surfaces_bounds_by_default
         problem = tp.Problem(GRID, (0, 0), (10, 10), obstacles=obstacles)
         assert problem.bounds == GRID.bounds
         assert not problem.free_space.segments_are_free([[0, 0]], [[10, 5]]).any()
-
-
-# The oracle of flat ground
-
-
-def test_the_visibility_graph_goes_around_a_square_by_its_corner():
-    square = shapely.box(2, -1, 4, 1)
-    length = visibility_graph_length((0, 0), (6, 0), [square])
-    assert length == pytest.approx(2 * np.hypot(2, 1) + 2, rel=1e-14)
-    assert visibility_graph_length((0, 2), (6, 2), [square]) == pytest.approx(6.0, rel=1e-14)
-    ring = shapely.box(-5, -5, 5, 5) - shapely.box(-4, -4, 4, 4)
-    assert visibility_graph_length((-9, 0), (9, 0), [ring]) == pytest.approx(
-        10 + 2 * np.hypot(4, 5), rel=1e-14
-    )

@@ -118,6 +118,13 @@ class _Search:
         )
 
 
+def _prepare(problem: Problem, tree: kernels.Tree, settings: kernels.Options) -> None:
+    """Plant the tree, and have the kernels loaded, or compiled, before the clock starts."""
+    surface, space = problem.surface.data, problem.free_space.data
+    kernels.plant(surface, tree, settings, *problem.start)
+    kernels.grow(surface, space, tree, settings, np.empty((0, 3)))
+
+
 def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
     """Why the search should end now; empty where it should not."""
     options = search.options
@@ -200,8 +207,9 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     if problem.start == problem.goal:
         return _stay_put(problem, options)
     tree = _allocate(options.samples, len(problem.surface.layers))
-    search = _Search(problem, options, _kernel_options(problem, options), tree)
-    kernels.plant(problem.surface.data, tree, search.settings, *problem.start)
+    settings = _kernel_options(problem, options)
+    _prepare(problem, tree, settings)
+    search = _Search(problem, options, settings, tree)
     stopped_by = _run(search, callback)
     seconds = search.seconds
     path = _path(problem, tree)
