@@ -292,12 +292,12 @@ def test_a_signal_raised_while_planning_gives_the_best_path_so_far(problem):
 
 def test_a_signal_that_arrives_inside_a_kernel_gives_the_best_path_so_far(problem, monkeypatch):
     # Python handles a signal when the kernel returns: the samples are in the tree by then.
-    grow, calls = tree_search.kernels.grow, []
+    grow, drawn = tree_search.kernels.grow, []
 
     def interrupted_grow(*arguments):
         grow(*arguments)
-        calls.append(1)
-        if len(calls) == 4:
+        drawn.append(len(arguments[-1]))
+        if sum(drawn) == 4 * tree_search.CHUNK:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(tree_search.kernels, "grow", interrupted_grow)
