@@ -57,12 +57,13 @@ def print_report(solution: Solution) -> None:
     """Print the table on standard output, and what went wrong on standard error."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=None, show_header=False, pad_edge=False)
     table.add_column(style="bold")
     table.add_column()
     for name, value in _rows(solution):
-        table.add_row(name, value)
+        table.add_row(name, Text(value))  # not markup: units stand in square brackets
     Console(highlight=False).print(table)
     if solution.status is not Status.SOLVED:
         print(f"terrapath: {solution.status.message}", file=sys.stderr)
