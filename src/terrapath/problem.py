@@ -191,6 +191,7 @@ class Solution:
     Lengths are in map units. ``length`` is the true length of the path whatever the
     planner optimised; ``cost`` is what the planner itself believed. ``path``, ``length``
     and ``cost`` are None where no path was found, and so is a bound not asked for.
+    ``alternatives`` are further locally shortest paths, where the planner finds them.
     """
 
     problem: Problem
@@ -203,6 +204,7 @@ class Solution:
     seed: int | None = None
     stopped_by: str = ""
     lower_bound: float | None = None
+    alternatives: tuple[Path, ...] = ()
     history: History | None = None
     tree: SearchTree | None = None
     counters: dict[str, int] = field(default_factory=dict)

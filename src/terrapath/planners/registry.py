@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import InputError
 from ..problem import Problem, Solution
 from .base import Callback, Planner
+from .geodesic_traversal import GeodesicTraversal
 from .rrt import RRT
 from .rrt_star import RRTStar
 
@@ -18,6 +19,7 @@ PLANNERS: dict[str, Callable[..., Planner]] = {
     "rrt-star-r": partial(RRTStar, metric="riemannian"),
     "rrt-star": partial(RRTStar, metric="chord"),
     "rrt": RRT,
+    "geodesic-traversal": GeodesicTraversal,
 }
 
 

@@ -188,16 +188,16 @@ def _counters(tree: kernels.Tree) -> dict[str, int]:
     return {name: int(tree.counters[place]) for name, place in places.items()}
 
 
-def _stay_put(problem: Problem, options: TreeOptions) -> Solution:
+def stay_put(problem: Problem, planner: str, seed: int | None = None) -> Solution:
     """The answer where the start is the goal: a path of length 0."""
     return Solution(
         problem=problem,
-        planner=options.planner,
+        planner=planner,
         status=Status.SOLVED,
         path=problem.path([problem.start, problem.goal]),
         cost=0.0,
         seconds=0.0,
-        seed=options.seed,
+        seed=seed,
         stopped_by="start is goal",
     )
 
@@ -205,7 +205,7 @@ def _stay_put(problem: Problem, options: TreeOptions) -> Solution:
 def search_tree(problem: Problem, options: TreeOptions, callback: Callback | None) -> Solution:
     """Grow a tree from the start until the options or the callback say stop."""
     if problem.start == problem.goal:
-        return _stay_put(problem, options)
+        return stay_put(problem, options.planner, options.seed)
     tree = _allocate(options.samples, len(problem.surface.layers))
     settings = _kernel_options(problem, options)
     _prepare(problem, tree, settings)

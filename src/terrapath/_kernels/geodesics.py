@@ -1,0 +1,329 @@
+"""The geodesic equation on the plane, with the Jacobi field along it.
+
+A geodesic of unit speed leaves the start at some angle on the plane. How far its end moves
+per radian of that angle is the signed length j of the normal Jacobi field that vanishes at
+the start: j'' + K j = 0 (do Carmo 1992, chapter 5), K being the Gaussian curvature. Where j
+is 0 again the end is conjugate to the start.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from .compiler import inner_kernel, kernel
+from .lengths import norm
+from .surfaces import Metric, jet_at
+
+
+class Frame(NamedTuple):
+    """The metric at a point and the inner products with second derivatives.
+
+    Sums run over the weighted layers: a_ijl = sum_k (d_i d_j x_k) (d_l x_k).
+    """
+
+    h: Metric
+    a111: float
+    a112: float
+    a121: float
+    a122: float
+    a221: float
+    a222: float
+    hessians: float  # sum_k det Hess x_k
+
+
+class Christoffel(NamedTuple):
+    """Gamma^k_ij as g<k>_<ij>; symmetric in i and j (paper, appendix 6.1)."""
+
+    g1_11: float
+    g1_12: float
+    g1_22: float
+    g2_11: float
+    g2_12: float
+    g2_22: float
+
+
+class State(NamedTuple):
+    """A point of a geodesic: position, velocity, Jacobi field and its derivative."""
+
+    x: float
+    y: float
+    vx: float
+    vy: float
+    j: float
+    dj: float
+
+
+@inner_kernel
+def frame_at(surface, x, y):
+    h11, h12, h22 = 1.0, 0.0, 1.0
+    a111, a112, a121, a122, a221, a222 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    hessians = 0.0
+    for layer in range(surface.weights.shape[0]):
+        w = surface.weights[layer] * surface.weights[layer]
+        jet = jet_at(surface, layer, x, y)
+        h11 += w * jet.fx * jet.fx
+        h12 += w * jet.fx * jet.fy
+        h22 += w * jet.fy * jet.fy
+        a111 += w * jet.fxx * jet.fx
+        a112 += w * jet.fxx * jet.fy
+        a121 += w * jet.fxy * jet.fx
+        a122 += w * jet.fxy * jet.fy
+        a221 += w * jet.fyy * jet.fx
+        a222 += w * jet.fyy * jet.fy
+        hessians += w * (jet.fxx * jet.fyy - jet.fxy * jet.fxy)
+    return Frame(Metric(h11, h12, h22), a111, a112, a121, a122, a221, a222, hessians)
+
+
+@inner_kernel
+def christoffel(frame):
+    """Gamma^k_ij = h^kl a_ijl, the appendix's eight symbols."""
+    h = frame.h
+    d = h.h11 * h.h22 - h.h12 * h.h12
+    return Christoffel(
+        (h.h22 * frame.a111 - h.h12 * frame.a112) / d,
+        (h.h22 * frame.a121 - h.h12 * frame.a122) / d,
+        (h.h22 * frame.a221 - h.h12 * frame.a222) / d,
+        (h.h11 * frame.a112 - h.h12 * frame.a111) / d,
+        (h.h11 * frame.a122 - h.h12 * frame.a121) / d,
+        (h.h11 * frame.a222 - h.h12 * frame.a221) / d,
+    )
+
+
+@inner_kernel
+def curvature(frame, g):
+    """Gaussian curvature by the equation of Gauss.
+
+    K d = <N s_11, N s_22> - |N s_12|^2 with N the normal part of the second derivatives,
+    which is what the tangential part, given by the Christoffel symbols, leaves of them.
+    """
+    h = frame.h
+    tangential = g.g1_11 * frame.a221 + g.g2_11 * frame.a222
+    tangential -= g.g1_12 * frame.a121 + g.g2_12 * frame.a122
+    return (frame.hessians - tangential) / (h.h11 * h.h22 - h.h12 * h.h12)
+
+
+@inner_kernel
+def derivative(surface, s):
+    """d/ds of a state: x'' = -Gamma(v, v) (paper, appendix 6.1), j'' = -K j."""
+    frame = frame_at(surface, s.x, s.y)
+    g = christoffel(frame)
+    ax = -(g.g1_11 * s.vx * s.vx + 2.0 * g.g1_12 * s.vx * s.vy + g.g1_22 * s.vy * s.vy)
+    ay = -(g.g2_11 * s.vx * s.vx + 2.0 * g.g2_12 * s.vx * s.vy + g.g2_22 * s.vy * s.vy)
+    return State(s.vx, s.vy, ax, ay, s.dj, -curvature(frame, g) * s.j)
+
+
+@inner_kernel
+def unit_state(surface, x, y, angle):
+    """The state at the start of the unit-speed geodesic that leaves at an angle on the plane.
+
+    The direction u turns by |du|_h sin / |u|_h = sqrt(d) / |u|_h^2 under h for each radian on
+    the plane, which is the field's first derivative.
+    """
+    h = frame_at(surface, x, y).h
+    dx, dy = math.cos(angle), math.sin(angle)
+    speed = norm(h, dx, dy)
+    turn = math.sqrt(h.h11 * h.h22 - h.h12 * h.h12) / (speed * speed)
+    return State(x, y, dx / speed, dy / speed, 0.0, turn)
+
+
+# The integrator: an embedded Runge-Kutta method whose two error estimates are combined as
+# Hairer, Norsett and Wanner do for Dormand and Prince's 8(5, 3) (1993, section II.10).
+
+
+class Tableau(NamedTuple):
+    """An explicit method; arrays, because constants of this size keep kernels uncached."""
+
+    a: np.ndarray  # (stages, stages) float64
+    b: np.ndarray  # (stages,)
+    e3: np.ndarray  # (stages + 1,): error estimates of order 3 and 5
+    e5: np.ndarray
+
+
+DORMAND_PRINCE = Tableau(*map(np.ascontiguousarray, (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5)))
+
+_SAFETY, _LEAST_FACTOR, _MOST_FACTOR = 0.9, 0.2, 6.0
+
+# How a ray ended.
+REACHED = 0
+LEFT = 1  # it left the bounds
+EXHAUSTED = 2  # out of steps: the surface is too rough, or not finite
+
+
+@inner_kernel
+def advanced(s, h, weights, slopes, count):
+    """s + h times the weighted sum of the first ``count`` slopes."""
+    x, y, vx, vy, j, dj = s.x, s.y, s.vx, s.vy, s.j, s.dj
+    for k in range(count):
+        w = h * weights[k]
+        x += w * slopes[k, 0]
+        y += w * slopes[k, 1]
+        vx += w * slopes[k, 2]
+        vy += w * slopes[k, 3]
+        j += w * slopes[k, 4]
+        dj += w * slopes[k, 5]
+    return State(x, y, vx, vy, j, dj)
+
+
+@inner_kernel
+def store(slopes, k, d):
+    slopes[k, 0], slopes[k, 1], slopes[k, 2] = d.x, d.y, d.vx
+    slopes[k, 3], slopes[k, 4], slopes[k, 5] = d.vy, d.j, d.dj
+
+
+@kernel
+def runge_kutta_step(surface, tableau, s, h, slopes):
+    """One step of length h; slopes[0] must hold the derivative at s, and all are filled."""
+    stages = tableau.b.shape[0]
+    for k in range(1, stages):
+        store(slopes, k, derivative(surface, advanced(s, h, tableau.a[k], slopes, k)))
+    end = advanced(s, h, tableau.b, slopes, stages)
+    store(slopes, stages, derivative(surface, end))
+    return end
+
+
+@inner_kernel
+def estimate(slopes, weights, scale, component):
+    total = 0.0
+    for k in range(weights.shape[0]):
+        total += weights[k] * slopes[k, component]
+    return total / scale
+
+
+@kernel
+def error_norm(tableau, h, s, end, slopes, tolerance):
+    """Estimated error over the tolerance: a step is accepted up to 1.
+
+    Absolute in position and velocity, which is of unit length; relative in the Jacobi field,
+    which may grow exponentially.
+    """
+    fifth, third = 0.0, 0.0
+    for component in range(6):
+        scale = tolerance
+        if component >= 4:
+            scale *= 1.0 + max(abs(s.j), abs(end.j), abs(s.dj), abs(end.dj))
+        fifth += estimate(slopes, tableau.e5, scale, component) ** 2
+        third += estimate(slopes, tableau.e3, scale, component) ** 2
+    if fifth == 0.0 and third == 0.0:
+        return 0.0
+    return abs(h) * fifth / math.sqrt((fifth + 0.01 * third) * 6.0)
+
+
+@inner_kernel
+def is_inside(bounds, s):
+    return bounds[0] <= s.x <= bounds[2] and bounds[1] <= s.y <= bounds[3]
+
+
+@kernel
+def share_until_exit(bounds, a, b, h):
+    """The share of the step from a to b at which its cubic Hermite curve leaves the bounds."""
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        t = 0.5 * (low + high)
+        p, q = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
+        u, v = h * t * (1.0 - t) ** 2, h * t * t * (t - 1.0)
+        x = p * a.x + q * b.x + u * a.vx + v * b.vx
+        y = p * a.y + q * b.y + u * a.vy + v * b.vy
+        if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]:
+            low = t
+        else:
+            high = t
+    return low
+
+
+@inner_kernel
+def record(rows, k, length, s):
+    rows[k, 0], rows[k, 1], rows[k, 2] = length, s.x, s.y
+    rows[k, 3], rows[k, 4], rows[k, 5], rows[k, 6] = s.vx, s.vy, s.j, s.dj
+
+
+@inner_kernel
+def overshoot(bounds, s):
+    """Arc length, about, by which a state has left the bounds; below 0 where it falls short."""
+    most = -math.inf
+    if s.vx != 0.0:
+        edge = bounds[2] if s.vx > 0.0 else bounds[0]
+        most = max(most, (s.x - edge) / s.vx)
+    if s.vy != 0.0:
+        edge = bounds[3] if s.vy > 0.0 else bounds[1]
+        most = max(most, (s.y - edge) / s.vy)
+    return most
+
+
+@kernel
+def step_to_edge(surface, tableau, bounds, s, end, h, slopes):
+    """The part of a step that ends on the edge of the bounds: its length and its end."""
+    part = h * share_until_exit(bounds, s, end, h)
+    for _ in range(4):  # Newton's method; the cubic Hermite curve was the first guess
+        end = runge_kutta_step(surface, tableau, s, part, slopes)
+        part = max(part - overshoot(bounds, end), 0.0)
+    x = min(max(end.x, bounds[0]), bounds[2])
+    y = min(max(end.y, bounds[1]), bounds[3])
+    return part, State(x, y, end.vx, end.vy, end.j, end.dj)
+
+
+@kernel
+def trace(surface, tableau, bounds, x, y, angle, length, longest_step, tolerance, rows):
+    """Follow the geodesic that leaves (x, y) at an angle over a length, or to the bounds.
+
+    rows (capacity, 7) is filled with arc length, position, velocity and Jacobi field at every
+    accepted step, the ends included. Returns (rows filled, how it ended).
+    """
+    slopes = np.empty((tableau.b.shape[0] + 1, 6))
+    s = unit_state(surface, x, y, angle)
+    record(rows, 0, 0.0, s)
+    store(slopes, 0, derivative(surface, s))
+    done, count = 0.0, 1
+    h = min(longest_step, length)
+    for _ in range(4 * rows.shape[0]):
+        if done >= length:
+            return count, REACHED
+        if count == rows.shape[0]:
+            break
+        last = done + h >= length * (1.0 - 1e-14)
+        if last:
+            h = length - done
+        end = runge_kutta_step(surface, tableau, s, h, slopes)
+        error = error_norm(tableau, h, s, end, slopes, tolerance)
+        if not error <= 1.0:  # also where it is not a number
+            shrink = _SAFETY * error**-0.125 if error < math.inf else _LEAST_FACTOR
+            h *= max(shrink, _LEAST_FACTOR)
+            continue
+        if not is_inside(bounds, end):
+            part, end = step_to_edge(surface, tableau, bounds, s, end, h, slopes)
+            record(rows, count, done + part, end)
+            return count + 1, LEFT
+        done = length if last else done + h
+        s = end
+        record(rows, count, done, s)
+        count += 1
+        for component in range(6):
+            slopes[0, component] = slopes[slopes.shape[0] - 1, component]
+        grow = _MOST_FACTOR if error == 0.0 else _SAFETY * error**-0.125
+        h = min(h * min(max(grow, _LEAST_FACTOR), _MOST_FACTOR), longest_step)
+    return count, EXHAUSTED
+
+
+# Many points at once
+
+
+@kernel
+def fill_christoffel(surface, points, symbols):
+    """Christoffel symbols (m, 2, 2, 2), index order [k, i, j]."""
+    for m in range(points.shape[0]):
+        g = christoffel(frame_at(surface, points[m, 0], points[m, 1]))
+        symbols[m, 0, 0, 0] = g.g1_11
+        symbols[m, 0, 0, 1] = symbols[m, 0, 1, 0] = g.g1_12
+        symbols[m, 0, 1, 1] = g.g1_22
+        symbols[m, 1, 0, 0] = g.g2_11
+        symbols[m, 1, 0, 1] = symbols[m, 1, 1, 0] = g.g2_12
+        symbols[m, 1, 1, 1] = g.g2_22
+
+
+@kernel
+def fill_curvature(surface, points, curvatures):
+    """Gaussian curvatures (m,)."""
+    for m in range(points.shape[0]):
+        frame = frame_at(surface, points[m, 0], points[m, 1])
+        curvatures[m] = curvature(frame, christoffel(frame))

@@ -1,0 +1,215 @@
+"""The paper's ground truth: a fan of geodesics, and the ones that really hit the goal."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..geodesics import TOLERANCE, Geodesic, Miss, Ray, closest_approach, hit, is_bracket, trace_ray
+from ..problem import Path, Problem, Solution, Status
+from ..validation import Array, require_count, require_positive
+from .base import Callback, Progress
+from .tree_search import stay_put
+
+# 0.5 in the paper's region of 12 x 12: rays that pass this share of its side from the goal.
+NEAR_SHARE = 1.0 / 24.0
+
+# No geodesic longer than the straight way is the shortest; a little more finds those over it.
+LONGEST_SHARE = 1.05
+
+# Steps of a ray at least so many to the region's side, so that no approach is overlooked.
+STEPS_PER_SIDE = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Fan:
+    """All rays of a traversal and what they found.
+
+    angles : (n,), radians. closest : (n,), planar distance of each ray's closest approach to
+    the goal, map units. near : (n,), which of them come within the radius. geodesics : those
+    found that end exactly at the goal, shortest first.
+    """
+
+    rays: tuple[Ray, ...]
+    misses: tuple[Miss, ...]
+    radius: float
+    geodesics: tuple[Geodesic, ...]
+
+    @property
+    def angles(self) -> Array:
+        """(n,), radians."""
+        return np.array([ray.angle for ray in self.rays])
+
+    @property
+    def closest(self) -> Array:
+        """(n,), planar distance of each ray's closest approach, map units."""
+        return np.array([miss.distance for miss in self.misses])
+
+    @property
+    def near(self) -> npt.NDArray[np.bool_]:
+        """(n,), which rays come within the radius."""
+        return np.asarray(self.closest <= self.radius)
+
+    @property
+    def paper_ray(self) -> int | None:
+        """The shortest ray of those that pass near the goal: the paper's answer."""
+        lengths = np.array([miss.arc_length for miss in self.misses])
+        if not self.near.any():
+            return None
+        return int(np.argmin(np.where(self.near, lengths, np.inf)))
+
+    @property
+    def paper_length(self) -> float | None:
+        """Its length up to where it is closest to the goal, map units."""
+        return None if self.paper_ray is None else self.misses[self.paper_ray].arc_length
+
+
+@dataclass(frozen=True, kw_only=True)
+class GeodesicTraversal:
+    """Rays in many directions, the paper's way to the shortest path; then exactly.
+
+    directions : how many rays. sector : (first, last) angle, radians; by default 45 degrees to
+    either side of the goal, [0, pi/2] in the paper. radius : which rays count as near the
+    goal, map units; by default a 24th of the region's side, 0.5 in the paper. tolerance : of
+    the integrator's error in each step.
+
+    Where two neighbouring rays pass the goal on different sides, the direction that hits it
+    is solved for. Obstacles are not avoided: geodesics that touch one are left out.
+    Source: paper, section 5; appendix 6.1.
+    """
+
+    directions: int = 600
+    sector: tuple[float, float] | None = None
+    radius: float | None = None
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        require_count(directions=self.directions)
+        if self.directions < 2:
+            raise InputError(f"directions={self.directions} must be at least 2")
+        require_positive(tolerance=self.tolerance)
+        if self.radius is not None:
+            require_positive(radius=self.radius)
+        if self.sector is not None and not (
+            all(map(math.isfinite, self.sector)) and self.sector[0] < self.sector[1]
+        ):
+            raise InputError(f"sector={self.sector} must be two angles, the smaller first, radians")
+
+    @property
+    def name(self) -> str:
+        """The planner's name on the command line."""
+        return "geodesic-traversal"
+
+    def _angles(self, problem: Problem) -> Array:
+        (x0, y0), (x1, y1) = problem.start, problem.goal
+        towards = math.atan2(y1 - y0, x1 - x0)
+        first, last = self.sector or (towards - 0.25 * math.pi, towards + 0.25 * math.pi)
+        return np.linspace(first, last, self.directions)
+
+    def _radius(self, problem: Problem) -> float:
+        return self.radius or NEAR_SHARE * _side(problem)
+
+    def fan(self, problem: Problem, *, callback: Callback | None = None) -> Fan:
+        """Trace all rays and find the geodesics between them."""
+        started = time.perf_counter()
+        longest = LONGEST_SHARE * problem.straight_length
+        rays: list[Ray] = []
+        for angle in self._angles(problem):
+            rays.append(
+                trace_ray(
+                    problem.surface,
+                    problem.start,
+                    angle,
+                    longest,
+                    bounds=problem.bounds,
+                    longest_step=_side(problem) / STEPS_PER_SIDE,
+                    tolerance=self.tolerance,
+                )
+            )
+            seconds = time.perf_counter() - started
+            report = Progress(len(rays), self.directions, seconds, math.inf)
+            if callback is not None and callback(report):
+                break
+        misses = tuple(closest_approach(ray, problem.goal) for ray in rays)
+        geodesics = _distinct(self._hits(problem, misses))
+        return Fan(tuple(rays), misses, self._radius(problem), geodesics)
+
+    def _hits(self, problem: Problem, misses: tuple[Miss, ...]) -> list[Geodesic]:
+        """Geodesics in free space between all neighbours that pass the goal on two sides."""
+        found = []
+        for low, high in pairwise(misses):
+            if not is_bracket(low, high):
+                continue
+            geodesic = hit(
+                problem.surface,
+                problem.start,
+                problem.goal,
+                (low, high),
+                bounds=problem.bounds,
+                tolerance=self.tolerance,
+            )
+            if geodesic is not None and _is_free(problem, geodesic):
+                found.append(geodesic)
+        return found
+
+    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+        """The shortest geodesic of the fan, its path sampled; ``cost`` is its exact length."""
+        if problem.start == problem.goal:
+            return stay_put(problem, self.name)
+        started = time.perf_counter()
+        fan = self.fan(problem, callback=callback)
+        paths = tuple(_path(problem, geodesic) for geodesic in fan.geodesics)
+        return Solution(
+            problem=problem,
+            planner=self.name,
+            status=Status.SOLVED if paths else Status.NOT_FOUND,
+            path=paths[0] if paths else None,
+            cost=fan.geodesics[0].length if paths else None,
+            seconds=time.perf_counter() - started,
+            samples=len(fan.rays),
+            stopped_by=_explain(fan),
+            alternatives=paths[1:],
+        )
+
+
+def _side(problem: Problem) -> float:
+    """Side of the square as large as the region, map units."""
+    return math.sqrt(problem.bounds.width * problem.bounds.height)
+
+
+def _is_free(problem: Problem, geodesic: Geodesic) -> bool:
+    points = geodesic.points
+    return bool(problem.free_space.segments_are_free(points[:-1], points[1:]).all())
+
+
+def _path(problem: Problem, geodesic: Geodesic) -> Path:
+    """The geodesic's points, its ends exactly the problem's."""
+    points = geodesic.points.copy()
+    points[0], points[-1] = problem.start, problem.goal
+    return problem.path(points)
+
+
+def _distinct(geodesics: list[Geodesic]) -> tuple[Geodesic, ...]:
+    """Shortest first, those that two brackets found kept once."""
+    kept: list[Geodesic] = []
+    for geodesic in sorted(geodesics, key=lambda g: g.length):
+        if all(abs(geodesic.angle - other.angle) > 1e-9 for other in kept):
+            kept.append(geodesic)
+    return tuple(kept)
+
+
+def _explain(fan: Fan) -> str:
+    """What the fan found, or how near it came."""
+    if fan.geodesics:
+        return f"{len(fan.rays)} rays, {len(fan.geodesics)} geodesics"
+    k = int(np.argmin(fan.closest))
+    return (
+        f"no ray hits the goal; the closest of {len(fan.rays)} passes it at "
+        f"{fan.closest[k]:.4g} (angle {fan.angles[k]:.4f} rad)"
+    )
