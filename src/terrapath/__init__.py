@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .free_space import Circle, FreeSpace
     from .io import LayerSource, read_surface, write_route
     from .metric import chord, curve_length, line_r
-    from .planners import RRT, Progress, RRTStar, plan
+    from .planners import RRT, GeodesicTraversal, Progress, RRTStar, plan
     from .plotting import plot_route
     from .problem import Path, Problem, Solution, Status
     from .surface import Layer, Mask, Surface
@@ -37,6 +37,7 @@ _HOMES = {
     "chord": "metric",
     "curve_length": "metric",
     "line_r": "metric",
+    "GeodesicTraversal": "planners",
     "RRT": "planners",
     "RRTStar": "planners",
     "Progress": "planners",
@@ -56,6 +57,7 @@ __all__ = [
     "Circle",
     "FitError",
     "FreeSpace",
+    "GeodesicTraversal",
     "InputError",
     "Layer",
     "LayerSource",

@@ -16,7 +16,8 @@ from .metric import inverse_metric_tensor, metric_tensor
 from .surface import Surface
 from .validation import Array, Bounds, as_point, require_positive
 
-# Of positions (map units), of the unit speed, and of the Jacobi field (relative), each step.
+# Largest error of a step: of positions as a share of two features of the surface (1 in the
+# paper's scenes), of the unit speed, and of the Jacobi field relative to itself.
 TOLERANCE = 1e-11
 
 # Rows of a ray: four are a step on the smoothest ground, thousands on a rough raster.
@@ -124,6 +125,7 @@ def trace_ray(
         raise InputError(f"angle={angle} is not finite; give radians")
     edges = np.array(bounds or surface.bounds or EVERYWHERE, np.float64)
     step = length / 8.0 if longest_step is None else min(longest_step, length)
+    unit = _length_unit(surface, length)
     rows = np.empty((256, 7))
     while True:
         count, ended = kernels.trace(
@@ -135,6 +137,7 @@ def trace_ray(
             float(angle),
             float(length),
             step,
+            unit,
             tolerance,
             rows,
         )
@@ -150,6 +153,11 @@ def trace_ray(
     s, points, velocities, j, dj = np.split(rows[:count].copy(), (1, 3, 5, 6), axis=1)
     left = ended == kernels.LEFT
     return Ray(float(angle), s[:, 0], points, velocities, j[:, 0], dj[:, 0], left)
+
+
+def _length_unit(surface: Surface, length: float) -> float:
+    """The length that errors of positions are held against, map units."""
+    return min(2.0 * surface.resolution, length)
 
 
 def exponential_map(
@@ -290,7 +298,8 @@ def hit(
     low, high = between
     target = np.asarray(goal, np.float64)
     options: dict[str, Any] = {"bounds": bounds, "tolerance": tolerance}
-    accuracy = max(10.0 * tolerance, 1e-14 * float(np.abs(target).max()))
+    unit = _length_unit(surface, low.ray.length)
+    accuracy = max(10.0 * tolerance * unit, 1e-14 * float(np.abs(target).max()))
     longest = 1.5 * max(low.arc_length, high.arc_length)
     bracket = _Bracket(low.ray.angle, high.ray.angle, low.side > 0.0)
     nearer = low if low.distance <= high.distance else high

@@ -192,17 +192,20 @@ def estimate(slopes, weights, scale, component):
 
 
 @kernel
-def error_norm(tableau, h, s, end, slopes, tolerance):
+def error_norm(tableau, h, s, end, slopes, unit, tolerance):
     """Estimated error over the tolerance: a step is accepted up to 1.
 
-    Absolute in position and velocity, which is of unit length; relative in the Jacobi field,
-    which may grow exponentially.
+    Positions are held against ``unit``, a length that suits the surface; velocities are of
+    unit length; the Jacobi field, which may grow exponentially, is held against itself.
     """
+    field = 1.0 + max(abs(s.dj), abs(end.dj), abs(s.j) / unit, abs(end.j) / unit)
     fifth, third = 0.0, 0.0
     for component in range(6):
         scale = tolerance
         if component >= 4:
-            scale *= 1.0 + max(abs(s.j), abs(end.j), abs(s.dj), abs(end.dj))
+            scale *= field
+        if component in (0, 1, 4):
+            scale *= unit
         fifth += estimate(slopes, tableau.e5, scale, component) ** 2
         third += estimate(slopes, tableau.e3, scale, component) ** 2
     if fifth == 0.0 and third == 0.0:
@@ -264,7 +267,7 @@ def step_to_edge(surface, tableau, bounds, s, end, h, slopes):
 
 
 @kernel
-def trace(surface, tableau, bounds, x, y, angle, length, longest_step, tolerance, rows):
+def trace(surface, tableau, bounds, x, y, angle, length, longest_step, unit, tolerance, rows):
     """Follow the geodesic that leaves (x, y) at an angle over a length, or to the bounds.
 
     rows (capacity, 7) is filled with arc length, position, velocity and Jacobi field at every
@@ -285,7 +288,7 @@ def trace(surface, tableau, bounds, x, y, angle, length, longest_step, tolerance
         if last:
             h = length - done
         end = runge_kutta_step(surface, tableau, s, h, slopes)
-        error = error_norm(tableau, h, s, end, slopes, tolerance)
+        error = error_norm(tableau, h, s, end, slopes, unit, tolerance)
         if not error <= 1.0:  # also where it is not a number
             shrink = _SAFETY * error**-0.125 if error < math.inf else _LEAST_FACTOR
             h *= max(shrink, _LEAST_FACTOR)

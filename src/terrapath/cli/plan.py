@@ -203,7 +203,10 @@ def plan_command(
         str | None, typer.Option(metavar="X,Y", help="Goal, in the map's own coordinates.")
     ] = None,
     planner: Annotated[
-        str, typer.Option(metavar="NAME", help="rrt-star-r, rrt-star (chord baseline) or rrt.")
+        str,
+        typer.Option(
+            metavar="NAME", help="rrt-star-r, rrt-star (chord baseline), rrt or geodesic-traversal."
+        ),
     ] = "rrt-star-r",
     samples: Annotated[
         int | None, typer.Option(metavar="N", help="Samples to draw [default: 10000].")
@@ -217,6 +220,10 @@ def plan_command(
     seed: Annotated[
         int | None,
         typer.Option(metavar="K", help="The same seed, the same route [default: 0]."),
+    ] = None,
+    directions: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Rays of geodesic-traversal [default: 600]."),
     ] = None,
     radius_factor: Annotated[
         float | None,
@@ -280,6 +287,7 @@ def plan_command(
         "samples": samples,
         "step": step,
         "seed": seed,
+        "directions": directions,
         "radius_factor": radius_factor,
         "goal_bias": goal_bias,
         "informed": informed,

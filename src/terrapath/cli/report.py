@@ -46,6 +46,9 @@ def _rows(solution: Solution) -> Iterator[tuple[str, str]]:
         yield "planner's cost", _amount(solution.cost, unit)
         yield "straight-line length", _amount(problem.straight_length, unit)
         yield "climb", _amount(solution.path.climb, problem.surface.layers[0].unit)
+    if solution.alternatives:
+        shown = ", ".join(_amount(path.length, unit) for path in solution.alternatives[:5])
+        yield "next best", shown
     rate = f" ({solution.samples / solution.seconds:,.0f} a second)" if solution.seconds else ""
     yield "samples", f"{solution.samples:,}{rate}"
     yield "seconds", f"{solution.seconds:.3f}"
@@ -66,4 +69,5 @@ def print_report(solution: Solution) -> None:
         table.add_row(name, Text(value))  # not markup: units stand in square brackets
     Console(highlight=False).print(table)
     if solution.status is not Status.SOLVED:
-        print(f"terrapath: {solution.status.message}", file=sys.stderr)
+        reason = f"{solution.status.message} (stopped by: {solution.stopped_by})"
+        print(f"terrapath: {reason}", file=sys.stderr)

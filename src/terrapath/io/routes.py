@@ -57,6 +57,7 @@ def route_record(solution: Solution) -> dict[str, Any]:
         "layers": {layer.name: layer.weight for layer in problem.surface.layers},
         "stopped_by": solution.stopped_by,
         "counters": solution.counters,
+        "alternatives": [path.length for path in solution.alternatives],
     }
     reference = problem.surface.georeference
     if reference is not None:

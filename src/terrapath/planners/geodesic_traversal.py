@@ -40,6 +40,7 @@ class Fan:
     misses: tuple[Miss, ...]
     radius: float
     geodesics: tuple[Geodesic, ...]
+    interrupted: bool = False
 
     @property
     def angles(self) -> Array:
@@ -60,7 +61,7 @@ class Fan:
     def paper_ray(self) -> int | None:
         """The shortest ray of those that pass near the goal: the paper's answer."""
         lengths = np.array([miss.arc_length for miss in self.misses])
-        if not self.near.any():
+        if not np.any(self.near):
             return None
         return int(np.argmin(np.where(self.near, lengths, np.inf)))
 
@@ -115,30 +116,37 @@ class GeodesicTraversal:
     def _radius(self, problem: Problem) -> float:
         return self.radius or NEAR_SHARE * _side(problem)
 
+    def _trace(self, problem: Problem, angle: float) -> Ray:
+        return trace_ray(
+            problem.surface,
+            problem.start,
+            angle,
+            LONGEST_SHARE * problem.straight_length,
+            bounds=problem.bounds,
+            longest_step=_side(problem) / STEPS_PER_SIDE,
+            tolerance=self.tolerance,
+        )
+
     def fan(self, problem: Problem, *, callback: Callback | None = None) -> Fan:
-        """Trace all rays and find the geodesics between them."""
+        """Trace all rays and find the geodesics between them.
+
+        A callback that returns True, or Ctrl-C, leaves the fan with the rays it has.
+        """
         started = time.perf_counter()
-        longest = LONGEST_SHARE * problem.straight_length
         rays: list[Ray] = []
-        for angle in self._angles(problem):
-            rays.append(
-                trace_ray(
-                    problem.surface,
-                    problem.start,
-                    angle,
-                    longest,
-                    bounds=problem.bounds,
-                    longest_step=_side(problem) / STEPS_PER_SIDE,
-                    tolerance=self.tolerance,
-                )
-            )
-            seconds = time.perf_counter() - started
-            report = Progress(len(rays), self.directions, seconds, math.inf)
-            if callback is not None and callback(report):
-                break
+        interrupted = False
+        try:
+            for angle in self._angles(problem):
+                rays.append(self._trace(problem, float(angle)))
+                seconds = time.perf_counter() - started
+                report = Progress(len(rays), self.directions, seconds, math.inf)
+                if callback is not None and callback(report):
+                    break
+        except KeyboardInterrupt:
+            interrupted = True
         misses = tuple(closest_approach(ray, problem.goal) for ray in rays)
         geodesics = _distinct(self._hits(problem, misses))
-        return Fan(tuple(rays), misses, self._radius(problem), geodesics)
+        return Fan(tuple(rays), misses, self._radius(problem), geodesics, interrupted)
 
     def _hits(self, problem: Problem, misses: tuple[Miss, ...]) -> list[Geodesic]:
         """Geodesics in free space between all neighbours that pass the goal on two sides."""
@@ -165,10 +173,11 @@ class GeodesicTraversal:
         started = time.perf_counter()
         fan = self.fan(problem, callback=callback)
         paths = tuple(_path(problem, geodesic) for geodesic in fan.geodesics)
+        status = Status.SOLVED if paths else Status.NOT_FOUND
         return Solution(
             problem=problem,
             planner=self.name,
-            status=Status.SOLVED if paths else Status.NOT_FOUND,
+            status=Status.INTERRUPTED if fan.interrupted else status,
             path=paths[0] if paths else None,
             cost=fan.geodesics[0].length if paths else None,
             seconds=time.perf_counter() - started,
@@ -208,6 +217,8 @@ def _explain(fan: Fan) -> str:
     """What the fan found, or how near it came."""
     if fan.geodesics:
         return f"{len(fan.rays)} rays, {len(fan.geodesics)} geodesics"
+    if not fan.rays:
+        return "no ray was traced"
     k = int(np.argmin(fan.closest))
     return (
         f"no ray hits the goal; the closest of {len(fan.rays)} passes it at "
