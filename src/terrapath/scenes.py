@@ -38,7 +38,9 @@ class Scene:
     name: str
     description: str
     load: Callable[[], Problem]
-    true_length: float | None = None  # of the shortest path, where it is known
+    # Of the shortest path, where it is known: the shortest of all geodesics that 6,000 rays
+    # in a sector of 130 degrees find, each solved to ten digits.
+    true_length: float | None = None
 
 
 def _paper_scene(
@@ -77,7 +79,7 @@ SCENES: dict[str, Scene] = {
     scene.name: scene
     for scene in (
         _paper_scene("one-peak", "one wide hill", ONE_PEAK, true_length=16.142532164),
-        _paper_scene("three-peaks", "three steep hills", THREE_PEAKS),
+        _paper_scene("three-peaks", "three steep hills", THREE_PEAKS, true_length=15.368572424),
         _paper_scene(
             "six-peaks",
             "four hills, and two peaks of ground resistance",
@@ -85,13 +87,21 @@ SCENES: dict[str, Scene] = {
             TWO_RESISTANCE_PEAKS,
             true_length=17.018129404,
         ),
-        _paper_scene("four-peaks", "the hills of six-peaks alone", FOUR_PEAKS),
-        _paper_scene("repeat-3d", "the 150-run experiment in 3-D", REPEAT_HEIGHT),
+        _paper_scene(
+            "four-peaks", "the hills of six-peaks alone", FOUR_PEAKS, true_length=15.447891962
+        ),
+        _paper_scene(
+            "repeat-3d",
+            "the 150-run experiment in 3-D",
+            REPEAT_HEIGHT,
+            true_length=15.734152898,
+        ),
         _paper_scene(
             "repeat-4d",
             "the 150-run experiment in 4-D: height and resistance",
             REPEAT_HEIGHT,
             REPEAT_RESISTANCE,
+            true_length=18.101992220,
         ),
         Scene("jacksboro", "real terrain in Tennessee, 30 km x 32 km", _load_jacksboro),
     )
