@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from .._kernels.surfaces import Spline, fill_jets, fill_values
 from ..errors import FitError, InputError
 from ..validation import Array, Bounds
 from .mask import uniform_spacing
+from .smoothing import FEATURES_PER_SCALE, Smoothing, smooth
 
 Function = Callable[[Array, Array], Array]
 
@@ -26,16 +28,27 @@ DIFFERENCES_PER_CELL = 64.0  # the step of the differences that gradients are ch
 SAFETY = 0.5  # a fit is taken at this share of the tolerance: no test point is the worst one
 COARSE_TOLERANCE = 1e-3  # share of a layer's range that counts as "the shape is seen"
 MOST_RESAMPLING = 8  # how many times finer a non-uniform axis may become
+SAMPLES_PER_SCALE = 8.0  # of a function that is smoothed
+LEAST_SMOOTHED_SAMPLES = 257  # a side, however large the scale: the function may be finer
+
+
+class GridFit(NamedTuple):
+    """A spline through a grid."""
+
+    spline: Spline
+    value_error: float  # largest at the samples, before any smoothing
+    smoothing: Smoothing | None
 
 
 class FunctionFit(NamedTuple):
-    """A spline that follows a function."""
+    """A spline that follows a function, or a function smoothed."""
 
     spline: Spline
-    samples: int  # a side
+    samples: tuple[int, int]  # along x1 and x2
     value_error: float  # largest found at points it was not fitted on
-    gradient_error: float
+    gradient_error: float | None  # None where it was not measured
     resolution: float  # map units: spacing that shows the function's shape
+    smoothing: Smoothing | None = None
 
 
 def _coefficients(values: Array, spacing: float, axis: int) -> Array:
@@ -76,15 +89,27 @@ def _resample(values: Array, x: Array, axis: int) -> tuple[Array, Array]:
     return CubicSpline(x, values, axis=axis)(uniform), uniform
 
 
-def fit_grid(values: Array, x: Array, y: Array, weights: Array) -> tuple[Spline, float]:
-    """The spline through values (layers, ny, nx), and its largest error at the samples."""
+def _at_samples(spline: Spline, x: Array, y: Array) -> Array:
+    """The spline's values (layers, ny, nx) on a grid."""
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    found = np.empty((len(points), len(spline.weights)))
+    fill_values(spline, points, found)
+    return found.T.reshape(-1, len(y), len(x))
+
+
+def fit_grid(values: Array, x: Array, y: Array, weights: Array, scale: float) -> GridFit:
+    """The spline through values (layers, ny, nx), smoothed where the scale is above 0."""
     resampled, fine_x = _resample(values, x, 2)
     resampled, fine_y = _resample(resampled, y, 1)
     spline = interpolate(resampled, fine_x, fine_y, weights)
-    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    found = np.empty((len(points), len(values)))
-    fill_values(spline, points, found)
-    return spline, float(np.abs(found.T - values.reshape(len(values), -1)).max())
+    before = _at_samples(spline, x, y)
+    error = float(np.abs(before - values).max())
+    if scale == 0.0:
+        return GridFit(spline, error, None)
+    resampled = smooth(resampled, spline.dx, spline.dy, scale)
+    spline = interpolate(resampled, fine_x, fine_y, weights)
+    change = Smoothing.measured(scale, before, _at_samples(spline, x, y))
+    return GridFit(spline, error, change)
 
 
 def _checked(f: Function, x: Array, y: Array) -> Array:
@@ -192,12 +217,47 @@ def fit_function(
         if resolution is None and (value_errors <= COARSE_TOLERANCE * spread).all():
             resolution = spacing
         if max(worst, gradient_error) <= SAFETY * tolerance:
-            return FunctionFit(spline, samples, worst, gradient_error, resolution or spacing)
+            shape = (samples, samples)
+            return FunctionFit(spline, shape, worst, gradient_error, resolution or spacing)
         if samples >= MOST_SAMPLES:
             raise FitError(
                 f"tolerance={tolerance:g} is not met on {samples} x {samples} samples: "
                 f"the value is off by up to {worst:.2g}, the gradient by up to "
-                f"{gradient_error:.2g}; raise the tolerance, or smooth the function where it "
-                "has an edge"
+                f"{gradient_error:.2g}; raise the tolerance, or where the function has an edge "
+                "give the scale to smooth it over, smoothing=SCALE"
             )
         samples = 2 * samples - 1
+
+
+def _axis_for(scale: float, start: float, end: float) -> Array:
+    """Samples along one side, fine against the scale; an even number of steps."""
+    steps = 2 * math.ceil(0.5 * SAMPLES_PER_SCALE * (end - start) / scale)
+    if steps + 1 > MOST_SAMPLES:
+        least = SAMPLES_PER_SCALE * (end - start) / (MOST_SAMPLES - 1)
+        raise InputError(
+            f"smoothing={scale:g} needs {steps + 1} samples on a side of {end - start:g}, more "
+            f"than {MOST_SAMPLES}; raise it to {1.01 * least:.3g}, or shrink the bounds"
+        )
+    return np.linspace(start, end, max(steps + 1, LEAST_SMOOTHED_SAMPLES))
+
+
+def fit_smoothed(f: Function, bounds: Bounds, scale: float) -> FunctionFit:
+    """The spline through f smoothed; f is asked at points within the bounds only.
+
+    The error is what smoothing every other sample only would have changed; the spline
+    through all samples is nearer to the truth than that.
+    """
+    x = _axis_for(scale, bounds.x1_min, bounds.x1_max)
+    y = _axis_for(scale, bounds.x2_min, bounds.x2_max)
+    values = _checked(f, *np.meshgrid(x, y))
+    dx, dy = bounds.width / (len(x) - 1), bounds.height / (len(y) - 1)
+    smoothed = smooth(values, dx, dy, scale)
+    coarse = smooth(values[:, ::2, ::2], 2.0 * dx, 2.0 * dy, scale)
+    return FunctionFit(
+        interpolate(smoothed, x, y, np.ones(len(values))),
+        samples=(len(x), len(y)),
+        value_error=float(np.abs(smoothed[:, ::2, ::2] - coarse).max()),
+        gradient_error=None,
+        resolution=scale / FEATURES_PER_SCALE,
+        smoothing=Smoothing.measured(scale, values, smoothed),
+    )

@@ -20,9 +20,10 @@ from ..validation import (
     require_not_negative,
     require_positive,
 )
-from .fitting import Gradient, fit_function, fit_grid
+from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
 from .mask import Mask
+from .smoothing import FEATURES_PER_SCALE, Smoothing, check_scale
 
 
 @dataclass(frozen=True)
@@ -45,17 +46,22 @@ class Layer:
 
 @dataclass(frozen=True)
 class Fit:
-    """How a surface was made, and the largest error that was found."""
+    """How a surface was made, and the largest error that was found.
+
+    Where it was smoothed, ``smoothing`` tells how far the layers moved; the errors leave
+    that out.
+    """
 
     method: str
     value_error: float  # in the layers' units
     gradient_error: float | None = None  # layer units a map unit; None where not measured
+    smoothing: Smoothing | None = None
 
     def __str__(self) -> str:
         text = f"{self.method}; value error {self.value_error:.2g}"
         if self.gradient_error is not None:
             text += f", gradient error {self.gradient_error:.2g}"
-        return text
+        return text if self.smoothing is None else f"{text}; {self.smoothing}"
 
 
 EXACT = Fit("exact Gaussian peaks", 0.0, 0.0)
@@ -142,6 +148,7 @@ class Surface:
         x: Any,
         y: Any,
         *,
+        smoothing: float | None = None,
         names: Sequence[str] | None = None,
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
@@ -153,6 +160,8 @@ class Surface:
         values : (layers, ny, nx), or (ny, nx) for one layer, in the layers' units; finite,
         at least 4 x 4. x : (nx,), y : (ny,) increasing, map units; where the steps are not
         equal, the grid is resampled and the error at the samples reported in ``fit``.
+        smoothing : standard deviation, map units, of a Gaussian that the layers are convolved
+        with; the change that it makes at the samples is reported in ``fit.smoothing``.
         """
         array = np.asarray(values)
         if array.ndim == 2:
@@ -167,11 +176,17 @@ class Surface:
                 raise InputError(f"{name} does not increase; flip it, and the values with it")
         array = as_array(array, "values", shape=(None, len(y), len(x)))
         made = _make_layers(len(array), names, units, weights)
-        spline, error = fit_grid(array, x, y, np.array([layer.weight for layer in made]))
-        fit = Fit(f"bicubic spline through {len(x)} x {len(y)} samples", error)
         bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
-        resolution = max(np.diff(x).max(), np.diff(y).max())
-        return cls(spline, made, bounds, fit, float(resolution), nodata, georeference)
+        scale = check_scale(smoothing, bounds)
+        found = fit_grid(array, x, y, np.array([layer.weight for layer in made]), scale)
+        fit = Fit(
+            f"bicubic spline through {len(x)} x {len(y)} samples",
+            found.value_error,
+            smoothing=found.smoothing,
+        )
+        spacing = max(np.diff(x).max(), np.diff(y).max())
+        resolution = float(max(spacing, scale / FEATURES_PER_SCALE))
+        return cls(found.spline, made, bounds, fit, resolution, nodata, georeference)
 
     @classmethod
     def from_function(
@@ -181,6 +196,7 @@ class Surface:
         tolerance: float = 1e-6,
         *,
         gradient: Gradient | None = None,
+        smoothing: float | None = None,
         names: Sequence[str] | None = None,
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
@@ -190,16 +206,25 @@ class Surface:
         f(x, y) -> (layers, ...) on arrays. tolerance : the largest error of a value (layer
         unit) and of a gradient (layer unit/map unit) at points that the spline was not
         fitted on. gradient(x, y) -> (2, layers, ...), if known; otherwise differences of f.
-        Raises FitError where f is not smooth enough for it.
+        smoothing : standard deviation, map units, of a Gaussian that f is convolved with,
+        which makes any function smooth enough. Then there is no tolerance to meet and no
+        gradient to check, and ``fit.smoothing`` reports the change that it makes.
+        Raises FitError where f is not smooth enough, InputError where the scale of the
+        smoothing needs too many samples.
         """
         require_positive(tolerance=tolerance)
         rectangle = as_bounds(bounds)
-        found = fit_function(f, rectangle, tolerance, gradient)
+        scale = check_scale(smoothing, rectangle)
+        if scale > 0.0:
+            found = fit_smoothed(f, rectangle, scale)
+        else:
+            found = fit_function(f, rectangle, tolerance, gradient)
         made = _make_layers(len(found.spline.weights), names, units, weights)
         fit = Fit(
-            f"bicubic spline of a function, {found.samples} x {found.samples} samples",
+            "bicubic spline of a function, {} x {} samples".format(*found.samples),
             found.value_error,
             found.gradient_error,
+            found.smoothing,
         )
         surface = cls(found.spline, made, rectangle, fit, found.resolution)
         return surface.with_weights({layer.name: layer.weight for layer in made})
@@ -211,6 +236,7 @@ class Surface:
         bounds: Any,
         tolerance: float = 1e-6,
         *,
+        smoothing: float | None = None,
         names: Sequence[str] | None = None,
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
@@ -228,6 +254,7 @@ class Surface:
             bounds,
             tolerance,
             gradient=gradient,
+            smoothing=smoothing,
             names=names,
             units=units,
             weights=weights,

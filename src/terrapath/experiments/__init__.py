@@ -1,0 +1,1 @@
+"""Floor 7: experiments, each a function that returns data."""
