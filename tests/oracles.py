@@ -9,7 +9,7 @@ import math
 import numpy as np
 import shapely
 import sympy
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_bvp, solve_ivp
 
 from terrapath import FreeSpace
 from terrapath.validation import Bounds
@@ -199,3 +199,161 @@ def is_blocked(mask, place):
     """Does free space with this mask alone refuse the point?"""
     everywhere = Bounds(-1e9, -1e9, 1e9, 1e9)
     return FreeSpace(everywhere, [mask]).blocker(tuple(place)) is not None
+
+
+# Geodesics
+
+
+def _metric_jet_from_sympy(expressions, x, y):
+    """h, its first and second derivatives at points, keyed by (i, j, *variables).
+
+    SymPy differentiates the layers up to three times, Leibniz's rule their products.
+    """
+    variables = sympy.symbols("x1 x2", real=True)
+    jet = {}
+    for expression in map(sympy.sympify, expressions):
+        orders = [(a, b) for a in range(4) for b in range(4 - a)]
+        derived = [sympy.diff(expression, variables[0], a, variables[1], b) for a, b in orders]
+        values = sympy.lambdify(variables, derived, "numpy")(x, y)
+        f = {key: np.broadcast_to(v, np.shape(x)) for key, v in zip(orders, values, strict=True)}
+        for i, j in itertools.product((0, 1), repeat=2):
+            for order in range(3):
+                for by in itertools.combinations_with_replacement((0, 1), order):
+                    total = jet.get((i, j, *by), 0.0 if by else float(i == j))
+                    for taken in itertools.product((False, True), repeat=order):
+                        left = (i, *itertools.compress(by, taken))
+                        right = (j, *itertools.compress(by, [not t for t in taken]))
+                        keys = [(d.count(0), d.count(1)) for d in (left, right)]
+                        total = total + f[keys[0]] * f[keys[1]]
+                    jet[i, j, *by] = total
+    return jet
+
+
+def christoffel_from_sympy(expressions, x, y):
+    """Gamma^k_ij = 1/2 h^kl (d_j h_il + d_i h_lj - d_l h_ij), the definition: (..., k, i, j)."""
+    jet = _metric_jet_from_sympy(expressions, x, y)
+    h = np.moveaxis(np.array([[jet[i, j] for j in (0, 1)] for i in (0, 1)]), (0, 1), (-2, -1))
+    inverse = np.linalg.inv(h)
+    symbols = np.zeros((*np.shape(x), 2, 2, 2))
+    for k, i, j, m in itertools.product((0, 1), repeat=4):
+        lowered = jet[i, m, j] + jet[m, j, i] - jet[i, j, m]
+        symbols[..., k, i, j] += 0.5 * inverse[..., k, m] * lowered
+    return symbols
+
+
+def curvature_from_brioschi(expressions, x, y):
+    """Gaussian curvature from E, F, G and their derivatives alone (Brioschi's formula)."""
+    jet = _metric_jet_from_sympy(expressions, x, y)
+    e, f, g = jet[0, 0], jet[0, 1], jet[1, 1]
+    eu, ev, fu, fv = jet[0, 0, 0], jet[0, 0, 1], jet[0, 1, 0], jet[0, 1, 1]
+    gu, gv = jet[1, 1, 0], jet[1, 1, 1]
+    corner = -0.5 * jet[0, 0, 1, 1] + jet[0, 1, 0, 1] - 0.5 * jet[1, 1, 0, 0]
+    zero = np.zeros_like(e)
+
+    def determinant(rows):
+        return np.linalg.det(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
+
+    first = [[corner, 0.5 * eu, fu - 0.5 * ev], [fv - 0.5 * gu, e, f], [0.5 * gv, f, g]]
+    second = [[zero, 0.5 * ev, 0.5 * gu], [0.5 * ev, e, f], [0.5 * gu, f, g]]
+    return (determinant(first) - determinant(second)) / (e * g - f * f) ** 2
+
+
+def peaks_jets(layers, weights=None):
+    """jets(x, y) -> gradients (layers, 2, ...) and Hessians (layers, 2, 2, ...), weighted."""
+    weights = [1.0] * len(layers) if weights is None else weights
+
+    def jets(x, y):
+        gradients = np.zeros((len(layers), 2, *np.shape(x)))
+        hessians = np.zeros((len(layers), 2, 2, *np.shape(x)))
+        for k, (weight, layer) in enumerate(zip(weights, layers, strict=True)):
+            for a, falloff, cx, cy in layer:
+                offset = np.array([x - cx, y - cy])
+                value = weight * a * np.exp(-falloff * (offset**2).sum(axis=0))
+                gradients[k] -= 2.0 * falloff * offset * value
+                hessians[k] += 4.0 * falloff**2 * value * offset[:, None] * offset[None, :]
+                hessians[k, 0, 0] -= 2.0 * falloff * value
+                hessians[k, 1, 1] -= 2.0 * falloff * value
+        return gradients, hessians
+
+    return jets
+
+
+def metric_of(gradients):
+    """h (2, 2, ...) from weighted gradients (layers, 2, ...)."""
+    h = np.einsum("ki...,kj...->ij...", gradients, gradients)
+    h[0, 0] += 1.0
+    h[1, 1] += 1.0
+    return h
+
+
+def _solve_2x2(h, b):
+    d = h[0, 0] * h[1, 1] - h[0, 1] ** 2
+    return np.array([h[1, 1] * b[0] - h[0, 1] * b[1], h[0, 0] * b[1] - h[0, 1] * b[0]]) / d
+
+
+def planar_speed(jets, points, velocities):
+    """|v|_h at points (m, 2)."""
+    gradients, _ = jets(points[:, 0], points[:, 1])
+    rises = np.einsum("kim,mi->km", gradients, velocities)
+    return np.sqrt((velocities**2).sum(axis=1) + (rises**2).sum(axis=0))
+
+
+def geodesic_by_hamilton(jets, start, angle, arc_lengths):
+    """Positions (m, 2) at arc lengths, from Hamilton's equations for p = h v by DOP853.
+
+    x' = h^-1 p, p' = sum_k (grad x_k . x') Hess x_k x': no Christoffel symbol, and no x''.
+    """
+    arc_lengths = np.asarray(arc_lengths, float)
+    h = metric_of(jets(*map(float, start))[0])
+    u = np.array([math.cos(angle), math.sin(angle)])
+    momentum = h @ u / math.sqrt(u @ h @ u)
+
+    def slope(_, state):
+        gradients, hessians = jets(state[0], state[1])
+        v = _solve_2x2(metric_of(gradients), state[2:])
+        return np.concatenate([v, np.einsum("k,kij,j->i", gradients @ v, hessians, v)])
+
+    initial = np.concatenate([np.asarray(start, float), momentum])
+    span = (0.0, float(arc_lengths.max()))
+    found = solve_ivp(
+        slope, span, initial, method="DOP853", t_eval=arc_lengths, rtol=1e-12, atol=1e-13
+    )
+    assert found.success, found.message
+    return found.y[:2].T
+
+
+def geodesic_by_collocation(jets, guess, tolerance=1e-10, most_nodes=60_000):
+    """Length of the geodesic between the ends of a guess (m, 2), by scipy's solve_bvp.
+
+    Euler and Lagrange's equations of the energy on [0, 1], d/dt (h v) = 1/2 d_x h(v, v),
+    so the speed is constant; the length is a quadrature over the collocation polynomials.
+    Returns (length, positions as a function of t), or None where it does not converge.
+    """
+    steps = np.linalg.norm(np.diff(guess, axis=0), axis=1)
+    t = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
+    state = np.concatenate([guess.T, np.gradient(guess, t, axis=0).T])
+
+    def slope(_, y):
+        gradients, hessians = jets(y[0], y[1])
+        v = y[2:]
+        rises = np.einsum("kim,im->km", gradients, v)
+        turned = np.einsum("kijm,jm->kim", hessians, v)
+        # d_l h(v, v) / 2 - (d_v h) v, from d_l h_ij = sum_k H_il g_j + g_i H_jl
+        pull = np.einsum("km,kim->im", rises, turned)
+        pull -= np.einsum("km,kim->im", np.einsum("kim,im->km", turned, v), gradients)
+        pull -= np.einsum("km,kim->im", rises, turned)
+        return np.concatenate([v, _solve_2x2(metric_of(gradients), pull)])
+
+    def ends(a, b):
+        return np.concatenate([a[:2] - guess[0], b[:2] - guess[-1]])
+
+    found = solve_bvp(slope, ends, t, state, tol=tolerance, max_nodes=most_nodes)
+    if not found.success:
+        return None
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    widths = np.diff(found.x)
+    places = found.x[:-1, None] + 0.5 * (1.0 + nodes) * widths[:, None]
+    points = found.sol(places.ravel())
+    velocities = found.sol(places.ravel(), 1)[:2].T
+    speeds = planar_speed(jets, points[:2].T, velocities).reshape(places.shape)
+    return float((0.5 * widths * (speeds @ weights)).sum()), lambda at: found.sol(at)[:2].T

@@ -14,7 +14,7 @@ from ._kernels import geodesics as kernels
 from .errors import InputError
 from .metric import inverse_metric_tensor, metric_tensor
 from .surface import Surface
-from .validation import Array, Bounds, as_point, require_positive
+from .validation import Array, Bounds, as_array, as_point, require_positive
 
 # Largest error of a step: of positions as a share of two features of the surface (1 in the
 # paper's scenes), of the unit speed, and of the Jacobi field relative to itself.
@@ -123,8 +123,14 @@ def trace_ray(
     x, y = surface._points(as_point(start, "start"))[0][0]
     if not math.isfinite(angle):
         raise InputError(f"angle={angle} is not finite; give radians")
-    edges = np.array(bounds or surface.bounds or EVERYWHERE, np.float64)
-    step = length / 8.0 if longest_step is None else min(longest_step, length)
+    region = bounds or surface.bounds or EVERYWHERE
+    if not region.contains(np.array([x, y])):
+        raise InputError(f"start=({x:g}, {y:g}) is outside the bounds {region}")
+    edges = np.array(region, np.float64)
+    step = length / 8.0
+    if longest_step is not None:
+        require_positive(longest_step=longest_step)
+        step = min(longest_step, length)
     unit = _length_unit(surface, length)
     rows = np.empty((256, 7))
     while True:
@@ -165,13 +171,14 @@ def exponential_map(
 ) -> Array:
     """Ends of the geodesics that leave ``start`` with the given velocities after unit time.
 
-    vectors : (m, 2), map units, on the plane. Returns (m, 2). A geodesic over the edge of the
-    surface raises OutsideSurfaceError's parent InputError with the vector.
+    vectors : (m, 2), map units, on the plane. Returns (m, 2).
+    Raises InputError with the vector where a geodesic leads over the edge of the surface.
     """
     base = np.asarray(as_point(start, "start"))
-    ends = np.empty(np.shape(vectors))
+    velocities = as_array(vectors, "vectors", shape=(None, 2))
+    ends = np.empty_like(velocities)
     h = metric_tensor(surface, base)
-    for k, vector in enumerate(np.asarray(vectors, np.float64)):
+    for k, vector in enumerate(velocities):
         length = math.sqrt(vector @ h @ vector)
         if length == 0.0:
             ends[k] = base
@@ -248,6 +255,7 @@ def closest_approach(ray: Ray, target: Sequence[float] | Array) -> Miss:
 
 ATTEMPTS = 60
 PATH_POINTS = 2048
+POLISHING_STEPS = 4
 
 
 @dataclass
@@ -277,7 +285,9 @@ def is_bracket(low: Miss, high: Miss) -> bool:
     closest approaches lie farther apart along the rays than across them.
     """
     apart = abs(low.arc_length - high.arc_length)
-    return (low.side > 0.0) != (high.side > 0.0) and apart <= low.distance + high.distance
+    leaves = min(low.arc_length, high.arc_length) > 0.0  # some ray leads towards the target
+    across = low.distance + high.distance
+    return leaves and (low.side > 0.0) != (high.side > 0.0) and apart <= across
 
 
 def hit(
@@ -308,7 +318,7 @@ def hit(
         ray = trace_ray(surface, start, angle, length, **options)
         turn, along, error = _newton_step(surface, ray, target)
         if error <= accuracy:
-            return _geodesic(surface, start, angle, length, **options)
+            return _geodesic(surface, start, target, angle, length, options)
         inside = bracket.low <= angle + turn <= bracket.high and 0.0 < length + along <= longest
         if inside and error <= 0.5 * last_error and not ray.left_surface:
             angle, length, last_error = angle + turn, length + along, error
@@ -335,14 +345,23 @@ def _newton_step(surface: Surface, ray: Ray, target: Array) -> tuple[float, floa
 def _geodesic(
     surface: Surface,
     start: Any,
+    target: Array,
     angle: float,
     length: float,
-    bounds: Bounds,
-    tolerance: float,
+    options: dict[str, Any],
 ) -> Geodesic:
-    """The final geodesic, sampled for a path."""
+    """The final geodesic, sampled for a path.
+
+    It is followed in finer steps than the search took, and where rays spread a thousandfold
+    the two end apart by more than the tolerance: so Newton's method goes on with these steps.
+    """
+    for _ in range(POLISHING_STEPS):
+        spacing = length / PATH_POINTS
+        ray = trace_ray(surface, start, angle, length, longest_step=spacing, **options)
+        turn, along, error = _newton_step(surface, ray, target)
+        if not math.isfinite(turn) or error < 1e-14 * length:
+            break
+        angle, length = angle + turn, length + along
     spacing = length / PATH_POINTS
-    ray = trace_ray(
-        surface, start, angle, length, bounds=bounds, longest_step=spacing, tolerance=tolerance
-    )
+    ray = trace_ray(surface, start, angle, length, longest_step=spacing, **options)
     return Geodesic(angle, length, ray.points, float(ray.jacobi[-1]), ray.conjugate_points)

@@ -191,7 +191,7 @@ class Solution:
     Lengths are in map units. ``length`` is the true length of the path whatever the
     planner optimised; ``cost`` is what the planner itself believed. ``path``, ``length``
     and ``cost`` are None where no path was found, and so is a bound not asked for.
-    ``alternatives`` are further locally shortest paths, where the planner finds them.
+    ``alternatives`` are further paths that the planner found, shortest first.
     """
 
     problem: Problem

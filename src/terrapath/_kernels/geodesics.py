@@ -214,21 +214,47 @@ def error_norm(tableau, h, s, end, slopes, unit, tolerance):
 
 
 @inner_kernel
-def is_inside(bounds, s):
-    return bounds[0] <= s.x <= bounds[2] and bounds[1] <= s.y <= bounds[3]
+def is_inside(bounds, x, y):
+    return bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]
+
+
+@inner_kernel
+def is_inside_at(bounds, a, b, h, t):
+    """Is the cubic Hermite curve of the step from a to b inside at a share t of it?"""
+    p, q = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
+    u, v = h * t * (1.0 - t) ** 2, h * t * t * (t - 1.0)
+    x = p * a.x + q * b.x + u * a.vx + v * b.vx
+    y = p * a.y + q * b.y + u * a.vy + v * b.vy
+    return is_inside(bounds, x, y)
 
 
 @kernel
-def share_until_exit(bounds, a, b, h):
+def share_outside(bounds, a, b, h):
+    """A share of the step from a to b at which it is outside; -1 where it never is.
+
+    Looked for at its end and where it turns back in x or in y.
+    """
+    turn = 2.0
+    if a.vx * b.vx < 0.0:
+        t = a.vx / (a.vx - b.vx)
+        if not is_inside_at(bounds, a, b, h, t):
+            turn = t
+    if a.vy * b.vy < 0.0:
+        t = a.vy / (a.vy - b.vy)
+        if t < turn and not is_inside_at(bounds, a, b, h, t):
+            turn = t
+    if turn < 1.0:
+        return turn
+    return -1.0 if is_inside(bounds, b.x, b.y) else 1.0
+
+
+@kernel
+def share_until_exit(bounds, a, b, h, outside):
     """The share of the step from a to b at which its cubic Hermite curve leaves the bounds."""
-    low, high = 0.0, 1.0
+    low, high = 0.0, outside
     for _ in range(50):
         t = 0.5 * (low + high)
-        p, q = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-        u, v = h * t * (1.0 - t) ** 2, h * t * t * (t - 1.0)
-        x = p * a.x + q * b.x + u * a.vx + v * b.vx
-        y = p * a.y + q * b.y + u * a.vy + v * b.vy
-        if bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3]:
+        if is_inside_at(bounds, a, b, h, t):
             low = t
         else:
             high = t
@@ -255,9 +281,9 @@ def overshoot(bounds, s):
 
 
 @kernel
-def step_to_edge(surface, tableau, bounds, s, end, h, slopes):
+def step_to_edge(surface, tableau, bounds, s, end, h, outside, slopes):
     """The part of a step that ends on the edge of the bounds: its length and its end."""
-    part = h * share_until_exit(bounds, s, end, h)
+    part = h * share_until_exit(bounds, s, end, h, outside)
     for _ in range(4):  # Newton's method; the cubic Hermite curve was the first guess
         end = runge_kutta_step(surface, tableau, s, part, slopes)
         part = max(part - overshoot(bounds, end), 0.0)
@@ -293,8 +319,9 @@ def trace(surface, tableau, bounds, x, y, angle, length, longest_step, unit, tol
             shrink = _SAFETY * error**-0.125 if error < math.inf else _LEAST_FACTOR
             h *= max(shrink, _LEAST_FACTOR)
             continue
-        if not is_inside(bounds, end):
-            part, end = step_to_edge(surface, tableau, bounds, s, end, h, slopes)
+        outside = share_outside(bounds, s, end, h)
+        if outside >= 0.0:
+            part, end = step_to_edge(surface, tableau, bounds, s, end, h, outside, slopes)
             record(rows, count, done + part, end)
             return count + 1, LEFT
         done = length if last else done + h

@@ -11,6 +11,7 @@ import typer
 from .. import __version__
 from ..errors import TerrapathError
 from .plan import plan_command
+from .reproduce import reproduce_command
 from .scenes import scenes_command
 
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
@@ -37,6 +38,7 @@ app = typer.Typer(
 )
 app.command("plan")(plan_command)
 app.command("scenes")(scenes_command)
+app.command("reproduce")(reproduce_command)
 
 
 def _show_version(wanted: bool) -> None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ..errors import InputError
 from ..geodesics import TOLERANCE, Geodesic, Miss, Ray, closest_approach, hit, is_bracket, trace_ray
 from ..problem import Path, Problem, Solution, Status
-from ..validation import Array, require_count, require_positive
+from ..validation import Array, as_point, require_count, require_positive
 from .base import Callback, Progress
 from .tree_search import stay_put
 
@@ -97,10 +97,12 @@ class GeodesicTraversal:
         require_positive(tolerance=self.tolerance)
         if self.radius is not None:
             require_positive(radius=self.radius)
-        if self.sector is not None and not (
-            all(map(math.isfinite, self.sector)) and self.sector[0] < self.sector[1]
-        ):
-            raise InputError(f"sector={self.sector} must be two angles, the smaller first, radians")
+        if self.sector is not None:
+            first, last = as_point(self.sector, "sector")
+            if first >= last:
+                raise InputError(
+                    f"sector={self.sector} must be two angles, the smaller first, radians"
+                )
 
     @property
     def name(self) -> str:

@@ -87,24 +87,33 @@ def _draw_path(axes: Any, solution: Solution) -> None:
             solid_capstyle="round",
             label="route",
         )
+    draw_ends(axes, problem)
+
+
+def draw_ends(axes: Any, problem: Problem) -> None:
+    """Start and goal."""
     marks = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
     axes.plot(*problem.start, "o", color="#0b6e4f", ms=9, label="start", **marks)
     axes.plot(*problem.goal, "*", color="#ffb000", ms=15, label="goal", **marks)
 
 
-def draw_map(axes: Any, solution: Solution) -> None:
-    """Draw everything onto two-dimensional axes."""
-    problem = solution.problem
+def draw_ground(axes: Any, problem: Problem, opacity: float = 1.0) -> Terrain:
+    """The region without a route: shade, contours, obstacles, limits and labels."""
     terrain = Terrain.sample(problem, SAMPLES)
-    axes.imshow(
-        terrain.shaded(0), extent=_extent(problem), origin="lower", interpolation="bilinear"
-    )
+    style = {"extent": _extent(problem), "origin": "lower", "interpolation": "bilinear"}
+    axes.imshow(terrain.shaded(0), alpha=opacity, **style)
     _draw_contours(axes, terrain)
     draw_obstacles(axes, problem, terrain)
-    _draw_tree(axes, solution)
-    _draw_path(axes, solution)
     axes.set(xlim=_extent(problem)[:2], ylim=_extent(problem)[2:], aspect="equal")
     label_axes(axes, problem)
+    return terrain
+
+
+def draw_map(axes: Any, solution: Solution) -> None:
+    """Draw everything onto two-dimensional axes."""
+    terrain = draw_ground(axes, solution.problem)
+    _draw_tree(axes, solution)
+    _draw_path(axes, solution)
     axes.legend(loc="upper left", fontsize=8, framealpha=0.85)
     colours = ScalarMappable(terrain.norm(0), height_colours())
     axes.figure.colorbar(colours, ax=axes, label=terrain.label(0), shrink=0.72, pad=0.02)

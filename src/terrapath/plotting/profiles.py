@@ -1,0 +1,23 @@
+"""What a traveller meets along several paths."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ..problem import Path
+
+COLOURS = ("#6e6e6e", "#e4002b", "#0b3dff", "#2e8b3d")
+
+
+def draw_profiles(axes: Any, paths: Mapping[str, Path], layer: int) -> None:
+    """One layer's values against the travelled share of each path's length."""
+    for (label, path), colour in zip(paths.items(), COLOURS, strict=False):
+        profile = path.profile
+        share = profile.distance / profile.distance[-1]
+        axes.plot(100.0 * share, profile.values[:, layer], color=colour, lw=1.8, label=label)
+        shown = path.surface.layers[layer]
+    unit = f" ({shown.unit})" if shown.unit else ""
+    axes.set(xlabel="travelled (% of the path)", ylabel=f"{shown.name}{unit}", xlim=(0, 100))
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=9)
