@@ -16,6 +16,9 @@ import numpy as np
 import shapely
 from scipy.integrate import quad
 
+# Those with the options of a tree: samples, step, seed and goal bias.
+TREE_PLANNERS = ["rrt", "rrt-star", "rrt-star-r"]
+
 Peak = tuple[float, float, float, float]
 Layers = Sequence[Sequence[Peak]]
 Point = tuple[float, float]

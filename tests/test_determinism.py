@@ -15,9 +15,10 @@ import pytest
 import shapely
 
 import terrapath as tp
+from planner_oracles import TREE_PLANNERS
 from terrapath import scenes
 from terrapath._kernels import compiler
-from terrapath.planners import PLANNERS, tree_search
+from terrapath.planners import tree_search
 
 HERE = Path(__file__).parent
 KERNELS = Path(compiler.__file__).parent
@@ -46,7 +47,7 @@ def results(samples=300):
     """Trees and lengths of every planner on small problems, as plain lists."""
     found = {}
     for place, problem in _problems().items():
-        for name in PLANNERS:
+        for name in TREE_PLANNERS:
             solution = tp.plan(problem, name, samples=samples, seed=6)
             assert solution.path is not None
             found[f"{place}, {name}"] = {
@@ -104,7 +105,7 @@ def assert_same_bits(a, b):
 # The same seed
 
 
-@pytest.mark.parametrize("name", PLANNERS)
+@pytest.mark.parametrize("name", TREE_PLANNERS)
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others(name):
     problem = _problems()["peaks"]
     first, second = (tp.plan(problem, name, samples=2000, seed=3) for _ in range(2))

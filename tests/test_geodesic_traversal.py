@@ -61,7 +61,9 @@ def test_every_geodesic_ends_at_the_goal_and_is_a_geodesic(scene):
     jets = peaks_jets(SCENES[scene])
     for k, geodesic in enumerate(geodesics):
         assert math.dist(geodesic.points[0], scenes.START) == 0.0
-        assert math.dist(geodesic.points[-1], scenes.GOAL) <= 1e-9
+        # Rounding turns a ray by some 1e-15, which its Jacobi field magnifies: 4e5 times at worst.
+        rounding = 1e-14 * abs(geodesic.jacobi_at_goal)
+        assert math.dist(geodesic.points[-1], scenes.GOAL) <= max(1e-9, rounding)
         if k < 5:
             ends = geodesic_by_hamilton(jets, scenes.START, geodesic.angle, [geodesic.length])
             most = 1e-10 * (1.0 + abs(geodesic.jacobi_at_goal))
@@ -111,13 +113,25 @@ def test_the_lengths_are_those_of_the_reference():
 
 @EVERY_SCENE
 def test_more_directions_never_lose_the_shortest(scene):
-    shortest = [fan_of(scene, n).geodesics[0].length for n in (200, 400, 600, 1200)]
+    shortest = [fan_of(scene, n).geodesics[0].length for n in (200, 400, 600)]
     assert (np.diff(shortest) <= 1e-9).all()
     # From 400 on it is found.
     np.testing.assert_allclose(shortest[1:], shortest[-1], rtol=1e-10)
-    known = scenes.SCENES[scene].true_length
-    if known is not None:
-        assert shortest[1] == pytest.approx(known, abs=1e-9)
+    if scene != "repeat-4d":  # whose shortest leaves outside the paper's sector
+        assert shortest[1] == pytest.approx(scenes.SCENES[scene].true_length, abs=1e-9)
+
+
+def test_the_shortest_path_of_repeat_4d_leaves_outside_the_papers_sector():
+    problem = scenes.load("repeat-4d")
+    fan = tp.GeodesicTraversal(directions=300, sector=(1.4, 1.75)).fan(problem)
+    best = fan.geodesics[0]
+    assert best.length == pytest.approx(scenes.SCENES["repeat-4d"].true_length, abs=1e-9)
+    assert best.angle > math.pi / 2
+    assert best.length < fan_of("repeat-4d").geodesics[0].length - 0.1
+    answer = geodesic_by_collocation(
+        peaks_jets(SCENES["repeat-4d"]), sampled(best.points), 1e-8, 60_000
+    )
+    assert answer[0] == pytest.approx(best.length, rel=1e-10)
 
 
 @EVERY_SCENE

@@ -13,10 +13,11 @@ import pytest
 import shapely
 
 import terrapath as tp
+from planner_oracles import TREE_PLANNERS
 from terrapath import scenes
 from terrapath.planners import PLANNERS, Progress, make_planner, tree_search
 
-EVERY_PLANNER = pytest.mark.parametrize("name", PLANNERS)
+EVERY_PLANNER = pytest.mark.parametrize("name", TREE_PLANNERS)
 ROOM = shapely.box(8.0, 8.0, 10.9, 10.9) - shapely.box(9.0, 9.0, 10.5, 10.5)
 MANY = 200_000
 
@@ -183,7 +184,7 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(name, problem):
 
 
 def test_a_time_limit_without_a_path_is_not_found(enclosed):
-    for name in PLANNERS:
+    for name in TREE_PLANNERS:
         solution = tp.plan(enclosed, name, samples=MANY, time_limit=1e-9)
         assert solution.status is tp.Status.NOT_FOUND
         assert solution.stopped_by == "time limit"

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 import planner_oracles as oracles
 import terrapath as tp
-from terrapath.planners import PLANNERS
 
 SIDE = 10.0
 BOUNDS = (0.0, 0.0, SIDE, SIDE)
@@ -97,7 +96,7 @@ cases = st.builds(
     start=places,
     goal=places,
     on_spline=st.sampled_from([False, False, False, True]),
-    planner=st.sampled_from(sorted(PLANNERS)),
+    planner=st.sampled_from(oracles.TREE_PLANNERS),
     options=st.fixed_dictionaries(
         {},
         optional={"step": st.sampled_from([0.4, 1.0, 3.0, 20.0]), "goal_bias": numbers(0.0, 0.5)},
@@ -140,7 +139,7 @@ def seeded_case(seed):
             start=tuple(random.uniform(0, SIDE, 2).tolist()),
             goal=tuple(random.uniform(0, SIDE, 2).tolist()),
             on_spline=seed % 5 == 0,
-            planner=sorted(PLANNERS)[seed % len(PLANNERS)],
+            planner=oracles.TREE_PLANNERS[seed % len(oracles.TREE_PLANNERS)],
             options=(),
             seed=seed,
             samples=int(random.integers(150, 400)),

@@ -16,8 +16,9 @@ from ..plotting.fan import draw_fan, draw_movement, draw_movement_fan
 from ..plotting.map_view import draw_map
 from ..plotting.perspective import draw_perspective
 from ..plotting.profiles import draw_profiles
-from ..plotting.trials import draw_box, draw_convergence
+from ..plotting.trials import draw_box, draw_convergence, draw_orders
 from ..problem import Solution
+from .nonsmooth import SmoothedPath, by_surface
 from .paper import (
     ComparativeData,
     ConvergenceData,
@@ -150,6 +151,19 @@ def draw_sensitivity(
     return [path]
 
 
+def draw_smoothing(data: list[SmoothedPath], settings: Settings, directory: Path) -> list[Path]:
+    """How the error of the length falls with the scale."""
+    figure = _figure(7.5, 5.0)
+    axes = figure.subplots()
+    for name, rows in by_surface(data).items():
+        errors = np.array([row.relative_error for row in rows])
+        draw_orders(axes, [row.scale for row in rows], errors, name)
+    axes.set_title("geodesics of smoothed surfaces against those of the sharp ones")
+    path = directory / "smoothing.png"
+    _save(figure, path)
+    return [path]
+
+
 Draw = Callable[[Any, Settings, Path], list[Path]]
 
 DRAWERS: dict[str, Draw] = {
@@ -157,6 +171,7 @@ DRAWERS: dict[str, Draw] = {
     "repeat": draw_repeat,
     "convergence": draw_convergence_figure,
     "sensitivity": draw_sensitivity,
+    "smoothing": draw_smoothing,
 }
 
 

@@ -249,6 +249,14 @@ def smoothing_convergence(
     return [smoothed_path(sharp, scale) for sharp in chosen for scale in scales]
 
 
+def by_surface(found: Iterable[SmoothedPath]) -> dict[str, list[SmoothedPath]]:
+    """The paths of each surface, in the order in which they were found."""
+    groups: dict[str, list[SmoothedPath]] = {}
+    for row in found:
+        groups.setdefault(row.surface, []).append(row)
+    return groups
+
+
 def observed_order(scales: Sequence[float], errors: Sequence[float]) -> float:
     """The power of the scale that the errors fall with: the slope on logarithmic axes."""
     return float(np.polyfit(np.log(scales), np.log(np.abs(errors)), 1)[0])

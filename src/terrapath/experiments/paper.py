@@ -19,6 +19,7 @@ from .measures import (
     SweepSummary,
     SweepTrial,
 )
+from .nonsmooth import SmoothedPath, smoothing_convergence
 from .runner import Runner
 
 
@@ -272,6 +273,14 @@ def run_sensitivity(settings: Settings, runner: Runner) -> list[SensitivityData]
     return [SensitivityData(*row) for row in rows]
 
 
+def run_smoothing(settings: Settings, runner: Runner) -> list[SmoothedPath]:
+    """Paths on smoothed edges against the exact ones; seconds, and so not stored."""
+    runner.watch("smoothing", 0, 1)
+    found = smoothing_convergence()
+    runner.watch("smoothing", 1, 1)
+    return found
+
+
 def _scene_runner(scene: str) -> Callable[[Settings, Runner], SceneData]:
     return lambda settings, runner: run_scene(scene, settings, runner)
 
@@ -282,4 +291,5 @@ EXPERIMENTS: dict[str, Callable[[Settings, Runner], Any]] = {
     "repeat": run_repeat,
     "convergence": run_convergence,
     "sensitivity": run_sensitivity,
+    "smoothing": run_smoothing,
 }

@@ -36,6 +36,14 @@ def draw_box(axes: Any, lengths: Sequence[float], true_length: float, title: str
     axes.set_ylim(low - 0.06 * (high - low), high + 0.22 * (high - low))
 
 
+def draw_orders(axes: Any, scales: Sequence[float], errors: Array, name: str) -> None:
+    """Relative errors against a length scale, on logarithmic axes; scales, errors: (k,)."""
+    axes.loglog(scales, np.abs(errors), "o-", lw=1.6, ms=5, label=name)
+    axes.set(xlabel="scale of the smoothing (map units)", ylabel="relative error of the length")
+    axes.grid(alpha=0.3, which="both")
+    axes.legend(fontsize=9)
+
+
 def draw_convergence(axes: Any, samples: Sequence[int], lengths: Array, true_length: float) -> None:
     """Mean length against samples, with one standard deviation and the extremes.
 
