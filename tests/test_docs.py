@@ -36,6 +36,8 @@ def test_commands_run(line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     if "dem.tif" in line:
         pytest.skip("names a map of the reader's own")
+    if "reproduce" in line:
+        pytest.skip("takes minutes; tests/test_reproduce.py runs it")
     if "herodotus" in line:
         if not LUNAR_MAP.exists():
             pytest.skip("the lunar map is not here")
