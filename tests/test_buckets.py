@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from oracles import nearest_by_force, within_by_force
 from terrapath._kernels import buckets as kernels
-from terrapath._kernels.rrt_star import CANDIDATE, VERTEX
+from terrapath._kernels.tree import CANDIDATE, VERTEX
 
 X0, Y0, WIDTH, HEIGHT = -3.0, 2.0, 8.0, 4.0
 

@@ -8,100 +8,31 @@ estimate its true length, and the chord is never above it.
 """
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-
-from .buckets import Buckets, nearest, put, rebuild, within
+from .buckets import nearest, put, rebuild, within
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
 from .lengths import composite_boole
-from .surfaces import Metric, metric_at, value_at
-
-# Places in Tree.counters.
-VERTICES = 0  # vertices in the tree
-GOAL = 1  # the goal's vertex, -1 until it is in the tree
-SAMPLES = 2  # samples drawn
-CONSIDERED = 3  # edges considered
-PRUNED = 4  # edges that the chord ruled out
-INTEGRATED = 5  # edges measured by Line-R
-CHECKED = 6  # edges tested against obstacles
-REWIRED = 7  # edges replaced by a better one
-LAID_OUT = 8  # vertices when the buckets were last laid out
-COUNTERS = 9
-
-
-# A vertex: all that its neighbours read of it lies in one or two cache lines.
-VERTEX = np.dtype(
-    [
-        ("x", np.float64),
-        ("y", np.float64),
-        ("h11", np.float64),  # the metric at the vertex
-        ("h12", np.float64),
-        ("h22", np.float64),
-        ("cost", np.float64),  # length from the start
-        ("edge", np.float64),  # length of the edge from the parent
-        ("parent", np.int32),  # -1 at the start
-        ("child", np.int32),  # first child, -1 where none
-        ("sibling", np.int32),  # next child of the same parent
-        ("next", np.int32),  # next vertex of the same bucket
-    ]
+from .sampling import area_to_search, distance_to_goal, sample
+from .surfaces import Metric
+from .tree import (
+    CHECKED,
+    CONSIDERED,
+    GOAL,
+    INTEGRATED,
+    LAID_OUT,
+    PRUNED,
+    REWIRED,
+    SAMPLES,
+    VERTICES,
+    adopt,
+    chord_between,
+    pass_on_cost,
+    place,
+    release,
 )
-
-# A candidate edge between the newest vertex and one near it.
-CANDIDATE = np.dtype(
-    [
-        ("chord", np.float64),
-        ("cost", np.float64),  # of the other vertex, before this extension
-        ("length", np.float64),  # negative where not yet measured
-        ("vertex", np.int32),
-        ("free", np.int32),  # 1 free, 0 blocked, -1 not yet tested
-    ]
-)
-
-
-class Tree(NamedTuple):
-    """The tree and its workspace; all arrays are filled in place."""
-
-    vertices: np.ndarray  # (n,) VERTEX
-    lifted: np.ndarray  # (n, layers) float64: weighted layer values
-    counters: np.ndarray  # (COUNTERS,) int64
-    buckets: Buckets
-    near: np.ndarray  # (n,) CANDIDATE: workspace
-    stack: np.ndarray  # (n,) int32: workspace
-
-
-class Options(NamedTuple):
-    """What the planner was asked for."""
-
-    x0: float  # bounds
-    y0: float
-    x1: float
-    y1: float
-    goal_x: float
-    goal_y: float
-    step: float
-    radius: float  # the near radius is radius * sqrt(area * log(n) / n), at most the step
-    goal_bias: float
-    panel: float  # longest stretch that one application of the rule measures
-    riemannian: bool  # edges measured by Line-R; otherwise by the chord
-    prune: bool
-    informed: bool
-
 
 # Measuring edges
-
-
-@inner_kernel
-def chord_between(tree, a, b):
-    """Chord between two vertices."""
-    dx = tree.vertices[a].x - tree.vertices[b].x
-    dy = tree.vertices[a].y - tree.vertices[b].y
-    total = dx * dx + dy * dy
-    for layer in range(tree.lifted.shape[1]):
-        rise = tree.lifted[a, layer] - tree.lifted[b, layer]
-        total += rise * rise
-    return math.sqrt(total)
 
 
 @kernel
@@ -138,84 +69,6 @@ def candidate_is_free(space, tree, new, k):
 
 
 # Growing the tree
-
-
-@kernel
-def place(surface, tree, new, x, y):
-    """Write a vertex's position and what is cached with it; it is not yet in the tree."""
-    vertex = tree.vertices[new]
-    vertex.x = x
-    vertex.y = y
-    for layer in range(tree.lifted.shape[1]):
-        tree.lifted[new, layer] = surface.weights[layer] * value_at(surface, layer, x, y)
-    h = metric_at(surface, x, y)
-    vertex.h11 = h.h11
-    vertex.h12 = h.h12
-    vertex.h22 = h.h22
-    vertex.child = -1
-
-
-@kernel
-def adopt(vertices, parent, child, edge):
-    """Hang a vertex below a parent."""
-    vertex = vertices[child]
-    vertex.parent = parent
-    vertex.edge = edge
-    vertex.cost = vertices[parent].cost + edge
-    vertex.sibling = vertices[parent].child
-    vertices[parent].child = child
-
-
-@kernel
-def release(vertices, child):
-    """Take a vertex from its parent's children."""
-    parent = vertices[vertices[child].parent]
-    if parent.child == child:
-        parent.child = vertices[child].sibling
-        return
-    elder = parent.child
-    while vertices[elder].sibling != child:
-        elder = vertices[elder].sibling
-    vertices[elder].sibling = vertices[child].sibling
-
-
-@kernel
-def pass_on_cost(vertices, stack, root):
-    """Recompute the cost of everything below a vertex."""
-    stack[0] = root
-    count = 1
-    while count > 0:
-        count -= 1
-        cost = vertices[stack[count]].cost
-        child = vertices[stack[count]].child
-        while child >= 0:
-            vertices[child].cost = cost + vertices[child].edge
-            stack[count] = child
-            count += 1
-            child = vertices[child].sibling
-
-
-@inner_kernel
-def distance_to_goal(tree, options, vertex):
-    """Planar distance."""
-    return math.hypot(
-        tree.vertices[vertex].x - options.goal_x, tree.vertices[vertex].y - options.goal_y
-    )
-
-
-@inner_kernel
-def area_to_search(tree, options):
-    """The bounds' area, or that of the ellipse which holds all better paths if it is smaller.
-
-    A path of length c stays where the planar distances to start and goal, which are at
-    most the chords, sum to at most c.
-    """
-    area = (options.x1 - options.x0) * (options.y1 - options.y0)
-    if options.informed and tree.counters[GOAL] >= 0:
-        longest = tree.vertices[tree.counters[GOAL]].cost
-        focal = distance_to_goal(tree, options, 0)
-        area = min(area, 0.25 * math.pi * longest * math.sqrt(max(longest**2 - focal**2, 0.0)))
-    return area
 
 
 @inner_kernel
@@ -346,61 +199,6 @@ def extend(surface, space, tree, options, x, y):
 
 
 @kernel
-def can_improve(surface, tree, x, y):
-    """Could a path through (x, y) beat the best one? By the chord bound, in R^n."""
-    goal = tree.counters[GOAL]
-    a, b = tree.vertices[0], tree.vertices[goal]
-    from_start = (x - a.x) * (x - a.x) + (y - a.y) * (y - a.y)
-    to_goal = (x - b.x) * (x - b.x) + (y - b.y) * (y - b.y)
-    if math.sqrt(from_start) + math.sqrt(to_goal) >= b.cost:
-        return False
-    for layer in range(tree.lifted.shape[1]):
-        z = surface.weights[layer] * value_at(surface, layer, x, y)
-        from_start += (z - tree.lifted[0, layer]) ** 2
-        to_goal += (z - tree.lifted[goal, layer]) ** 2
-    return math.sqrt(from_start) + math.sqrt(to_goal) < b.cost
-
-
-@inner_kernel
-def point_of_ellipse(tree, options, u, v):
-    """The point of the ellipse of better paths for (u, v) in the unit square, uniformly."""
-    longest = tree.vertices[tree.counters[GOAL]].cost
-    ax, ay = tree.vertices[0].x, tree.vertices[0].y
-    focal = distance_to_goal(tree, options, 0)
-    width = math.sqrt(max(longest**2 - focal**2, 0.0))
-    along = 0.5 * longest * math.sqrt(u) * math.cos(2.0 * math.pi * v)
-    across = 0.5 * width * math.sqrt(u) * math.sin(2.0 * math.pi * v)
-    ex, ey = (options.goal_x - ax) / focal, (options.goal_y - ay) / focal
-    x = 0.5 * (ax + options.goal_x) + along * ex - across * ey
-    y = 0.5 * (ay + options.goal_y) + along * ey + across * ex
-    return x, y
-
-
-@kernel
-def sample(surface, tree, options, draw):
-    """A point to extend towards, and whether it is worth it.
-
-    draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share
-    ``goal_bias`` of the samples is the goal. From then on, informed samples come from the
-    ellipse that holds all better paths, and those that the chord rules out are dropped
-    (Gammell, Srinivasa and Barfoot 2014, with the chord in place of the distance).
-    """
-    width, height = options.x1 - options.x0, options.y1 - options.y0
-    x, y = options.x0 + draw[1] * width, options.y0 + draw[2] * height
-    if tree.counters[GOAL] < 0:
-        if draw[0] < options.goal_bias:
-            x, y = options.goal_x, options.goal_y
-        return x, y, True
-    if not options.informed:
-        return x, y, True
-    if area_to_search(tree, options) < width * height:
-        x, y = point_of_ellipse(tree, options, draw[1], draw[2])
-        if x < options.x0 or x > options.x1 or y < options.y0 or y > options.y1:
-            return x, y, False
-    return x, y, can_improve(surface, tree, x, y)
-
-
-@kernel
 def join_goal(surface, space, tree, options):
     """Make the goal a vertex where the newest vertex is one step away from it, or is it."""
     newest = tree.counters[VERTICES] - 1
@@ -420,19 +218,3 @@ def grow(surface, space, tree, options, draws):
         grew = worthwhile and extend(surface, space, tree, options, x, y)
         if grew and tree.counters[GOAL] < 0:
             join_goal(surface, space, tree, options)
-
-
-@kernel
-def plant(surface, tree, options, x, y):
-    """Start the tree with one vertex."""
-    place(surface, tree, 0, x, y)
-    root = tree.vertices[0]
-    root.cost = 0.0
-    root.edge = 0.0
-    root.parent = -1
-    root.sibling = -1
-    tree.buckets.frame[0] = options.x0
-    tree.buckets.frame[1] = options.y0
-    tree.counters[:] = 0
-    tree.counters[GOAL] = -1
-    tree.counters[VERTICES] = 1

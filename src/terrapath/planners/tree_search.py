@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .._kernels import rrt_star as kernels
+from .._kernels import tree as trees
 from .._kernels.buckets import Buckets
 from ..problem import History, Path, Problem, SearchTree, Solution, Status
 from ..validation import Array
@@ -48,13 +49,13 @@ def default_step(problem: Problem) -> float:
     return math.sqrt(problem.bounds.width * problem.bounds.height) / STEPS_PER_SIDE
 
 
-def _kernel_options(problem: Problem, options: TreeOptions) -> kernels.Options:
+def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     bounds = problem.bounds
     # Karaman and Frazzoli (2011), theorem 38 at d = 2; the kernel multiplies by the root of
     # the area that is searched, which is at least that of the free space in it.
     least = 2.0 * math.sqrt(1.5 / math.pi)
     panel = options.panel or FEATURES_PER_PANEL * problem.surface.resolution
-    return kernels.Options(
+    return trees.Options(
         *bounds,
         *problem.goal,
         step=float(options.step or default_step(problem)),
@@ -67,14 +68,14 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> kernels.Options:
     )
 
 
-def _allocate(samples: int, layers: int) -> kernels.Tree:
+def _allocate(samples: int, layers: int) -> trees.Tree:
     size = samples + 2  # the start, and the goal that may join with the last sample
-    return kernels.Tree(
-        vertices=np.empty(size, kernels.VERTEX).view(np.recarray),
+    return trees.Tree(
+        vertices=np.empty(size, trees.VERTEX).view(np.recarray),
         lifted=np.empty((size, layers)),
-        counters=np.zeros(kernels.COUNTERS, np.int64),
+        counters=np.zeros(trees.COUNTERS, np.int64),
         buckets=Buckets(np.empty(size // 2 + 64, np.int32), np.zeros(3), np.zeros(2, np.int64)),
-        near=np.empty(size, kernels.CANDIDATE).view(np.recarray),
+        near=np.empty(size, trees.CANDIDATE).view(np.recarray),
         stack=np.empty(size, np.int32),
     )
 
@@ -85,8 +86,8 @@ class _Search:
 
     problem: Problem
     options: TreeOptions
-    settings: kernels.Options
-    tree: kernels.Tree
+    settings: trees.Options
+    tree: trees.Tree
     started: float = field(default_factory=time.perf_counter)
     rows: list[tuple[int, float, float]] = field(default_factory=list)
 
@@ -96,7 +97,7 @@ class _Search:
 
     @property
     def goal(self) -> int:
-        return int(self.tree.counters[kernels.GOAL])
+        return int(self.tree.counters[trees.GOAL])
 
     @property
     def best_cost(self) -> float:
@@ -104,7 +105,7 @@ class _Search:
 
     @property
     def samples(self) -> int:
-        return int(self.tree.counters[kernels.SAMPLES])
+        return int(self.tree.counters[trees.SAMPLES])
 
     def note(self) -> Progress:
         """Enter the state into the history and return it."""
@@ -118,10 +119,10 @@ class _Search:
         )
 
 
-def _prepare(problem: Problem, tree: kernels.Tree, settings: kernels.Options) -> None:
+def _prepare(problem: Problem, tree: trees.Tree, settings: trees.Options) -> None:
     """Plant the tree, and have the kernels loaded, or compiled, before the clock starts."""
     surface, space = problem.surface.data, problem.free_space.data
-    kernels.plant(surface, tree, settings, *problem.start)
+    trees.plant(surface, tree, settings, *problem.start)
     kernels.grow(surface, space, tree, settings, np.empty((0, 3)))
 
 
@@ -158,8 +159,8 @@ def _run(search: _Search, callback: Callback | None) -> str:
         return "interrupt"
 
 
-def _path(problem: Problem, tree: kernels.Tree) -> Path | None:
-    vertex = int(tree.counters[kernels.GOAL])
+def _path(problem: Problem, tree: trees.Tree) -> Path | None:
+    vertex = int(tree.counters[trees.GOAL])
     if vertex < 0:
         return None
     points = []
@@ -170,20 +171,20 @@ def _path(problem: Problem, tree: kernels.Tree) -> Path | None:
     return problem.path(points[::-1])
 
 
-def _search_tree(tree: kernels.Tree) -> SearchTree:
-    rows = tree.vertices[: tree.counters[kernels.VERTICES]]
+def _search_tree(tree: trees.Tree) -> SearchTree:
+    rows = tree.vertices[: tree.counters[trees.VERTICES]]
     points = np.column_stack([rows["x"], rows["y"]])
     return SearchTree(points, rows["parent"].copy(), rows["cost"].copy())
 
 
-def _counters(tree: kernels.Tree) -> dict[str, int]:
+def _counters(tree: trees.Tree) -> dict[str, int]:
     places = {
-        "vertices": kernels.VERTICES,
-        "edges considered": kernels.CONSIDERED,
-        "edges pruned": kernels.PRUNED,
-        "edges integrated": kernels.INTEGRATED,
-        "edges tested for obstacles": kernels.CHECKED,
-        "edges rewired": kernels.REWIRED,
+        "vertices": trees.VERTICES,
+        "edges considered": trees.CONSIDERED,
+        "edges pruned": trees.PRUNED,
+        "edges integrated": trees.INTEGRATED,
+        "edges tested for obstacles": trees.CHECKED,
+        "edges rewired": trees.REWIRED,
     }
     return {name: int(tree.counters[place]) for name, place in places.items()}
 

@@ -1,0 +1,85 @@
+"""Where the next sample is drawn: everywhere, at the goal, or where better paths can be."""
+
+import math
+
+from .compiler import inner_kernel, kernel
+from .surfaces import value_at
+from .tree import GOAL
+
+
+@inner_kernel
+def distance_to_goal(tree, options, vertex):
+    """Planar distance."""
+    return math.hypot(
+        tree.vertices[vertex].x - options.goal_x, tree.vertices[vertex].y - options.goal_y
+    )
+
+
+@inner_kernel
+def area_to_search(tree, options):
+    """The bounds' area, or that of the ellipse which holds all better paths if it is smaller.
+
+    A path of length c stays where the planar distances to start and goal, which are at
+    most the chords, sum to at most c.
+    """
+    area = (options.x1 - options.x0) * (options.y1 - options.y0)
+    if options.informed and tree.counters[GOAL] >= 0:
+        longest = tree.vertices[tree.counters[GOAL]].cost
+        focal = distance_to_goal(tree, options, 0)
+        area = min(area, 0.25 * math.pi * longest * math.sqrt(max(longest**2 - focal**2, 0.0)))
+    return area
+
+
+@kernel
+def can_improve(surface, tree, x, y):
+    """Could a path through (x, y) beat the best one? By the chord bound, in R^n."""
+    goal = tree.counters[GOAL]
+    a, b = tree.vertices[0], tree.vertices[goal]
+    from_start = (x - a.x) * (x - a.x) + (y - a.y) * (y - a.y)
+    to_goal = (x - b.x) * (x - b.x) + (y - b.y) * (y - b.y)
+    if math.sqrt(from_start) + math.sqrt(to_goal) >= b.cost:
+        return False
+    for layer in range(tree.lifted.shape[1]):
+        z = surface.weights[layer] * value_at(surface, layer, x, y)
+        from_start += (z - tree.lifted[0, layer]) ** 2
+        to_goal += (z - tree.lifted[goal, layer]) ** 2
+    return math.sqrt(from_start) + math.sqrt(to_goal) < b.cost
+
+
+@inner_kernel
+def point_of_ellipse(tree, options, u, v):
+    """The point of the ellipse of better paths for (u, v) in the unit square, uniformly."""
+    longest = tree.vertices[tree.counters[GOAL]].cost
+    ax, ay = tree.vertices[0].x, tree.vertices[0].y
+    focal = distance_to_goal(tree, options, 0)
+    width = math.sqrt(max(longest**2 - focal**2, 0.0))
+    along = 0.5 * longest * math.sqrt(u) * math.cos(2.0 * math.pi * v)
+    across = 0.5 * width * math.sqrt(u) * math.sin(2.0 * math.pi * v)
+    ex, ey = (options.goal_x - ax) / focal, (options.goal_y - ay) / focal
+    x = 0.5 * (ax + options.goal_x) + along * ex - across * ey
+    y = 0.5 * (ay + options.goal_y) + along * ey + across * ex
+    return x, y
+
+
+@kernel
+def sample(surface, tree, options, draw):
+    """A point to extend towards, and whether it is worth it.
+
+    draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share
+    ``goal_bias`` of the samples is the goal. From then on, informed samples come from the
+    ellipse that holds all better paths, and those that the chord rules out are dropped
+    (Gammell, Srinivasa and Barfoot 2014, with the chord in place of the distance).
+    """
+    width, height = options.x1 - options.x0, options.y1 - options.y0
+    x, y = options.x0 + draw[1] * width, options.y0 + draw[2] * height
+    if tree.counters[GOAL] < 0:
+        if draw[0] < options.goal_bias:
+            x, y = options.goal_x, options.goal_y
+        return x, y, True
+    if not options.informed:
+        return x, y, True
+    if area_to_search(tree, options) < width * height:
+        x, y = point_of_ellipse(tree, options, draw[1], draw[2])
+        if x < options.x0 or x > options.x1 or y < options.y0 or y > options.y1:
+            return x, y, False
+    return x, y, can_improve(surface, tree, x, y)
