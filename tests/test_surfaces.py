@@ -570,3 +570,17 @@ def test_no_points_give_no_values():
     surface = tp.Surface.from_peaks([[(1, 1, 0, 0)]])
     assert surface.values(np.empty((0, 2))).shape == (0, 1)
     assert surface.gradients(np.empty((0, 2))).shape == (0, 1, 2)
+
+
+@pytest.mark.parametrize("amplitude", [1e200, 3.4e38, np.finfo(float).max])
+def test_slopes_that_no_ground_has_are_refused_with_what_to_look_for(amplitude):
+    with pytest.raises(tp.InputError, match="no-data") as refused:
+        tp.Surface.from_peaks([[(amplitude, 0.5, 5, 5)]])
+    assert "\n" not in str(refused.value)
+    heights = np.zeros((8, 8))
+    heights[3, 4] = amplitude / 100.0
+    with pytest.raises(tp.InputError, match="no-data"):
+        tp.Surface.from_grid(heights, np.arange(8.0), np.arange(8.0))
+    steep = tp.Surface.from_peaks([[(1e6, 0.5, 5, 5)]])
+    with pytest.raises(tp.InputError, match="weights"):
+        steep.with_weights({"height": 1e20})

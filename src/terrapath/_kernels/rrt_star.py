@@ -116,6 +116,8 @@ def most_promising(tree, count):
 def choose_parent(surface, space, tree, options, new, count):
     """Hang the new vertex below the candidate through which it is cheapest to reach.
 
+    False where no candidate's length is finite, as on ground too steep for floating point.
+
     The most promising candidate is tried first. An edge whose cost-to-come plus chord
     cannot win is never integrated, and since no edge is shorter than its chord, that
     changes nothing but the time taken.
@@ -134,7 +136,10 @@ def choose_parent(surface, space, tree, options, new, count):
         length = candidate_length(surface, tree, options, new, k)
         if come + length < least and candidate_is_free(space, tree, new, k):
             best, least = k, come + length
+    if best < 0:
+        return False
     adopt(tree.vertices, tree.near[best].vertex, new, tree.near[best].length)
+    return True
 
 
 @kernel
@@ -191,7 +196,8 @@ def extend(surface, space, tree, options, x, y):
     place(surface, tree, new, x, y)
     count = find_near(tree, new, near_radius(tree, options, new), origin)
     tree.counters[CONSIDERED] += 2 * count - 1
-    choose_parent(surface, space, tree, options, new, count)
+    if not choose_parent(surface, space, tree, options, new, count):
+        return False
     rewire(surface, space, tree, options, new, count)
     put(tree.buckets, tree.vertices, new)
     tree.counters[VERTICES] = new + 1

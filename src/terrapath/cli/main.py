@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import sys
 from typing import Annotated, Any
 
@@ -10,6 +9,7 @@ import typer
 
 from .. import __version__
 from ..errors import TerrapathError
+from .exit_codes import ExitCode
 from .plan import plan_command
 from .reproduce import reproduce_command
 from .scenes import scenes_command
@@ -17,16 +17,6 @@ from .scenes import scenes_command
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
 # its usage errors is reached through the one it exports.
 UsageError: Any = typer.BadParameter.__mro__[1]
-
-
-class ExitCode(enum.IntEnum):
-    """What the command's exit code means."""
-
-    SOLVED = 0
-    BAD_INPUT = 2
-    NOT_FOUND = 3
-    UNREACHABLE = 4
-    INTERRUPTED = 130
 
 
 app = typer.Typer(

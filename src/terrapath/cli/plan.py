@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError, MapError
+from .exit_codes import ExitCode
 
 if TYPE_CHECKING:
     from ..planners import Planner
@@ -316,13 +317,13 @@ def _print(solution: Solution, as_json: bool) -> None:
     print_report(solution)
 
 
-def exit_code(solution: Solution) -> int:
+def exit_code(solution: Solution) -> ExitCode:
     """The documented exit code for a solution."""
     from ..problem import Status
 
     return {
-        Status.SOLVED: 0,
-        Status.NOT_FOUND: 3,
-        Status.UNREACHABLE: 4,
-        Status.INTERRUPTED: 130,
+        Status.SOLVED: ExitCode.SOLVED,
+        Status.NOT_FOUND: ExitCode.NOT_FOUND,
+        Status.UNREACHABLE: ExitCode.UNREACHABLE,
+        Status.INTERRUPTED: ExitCode.INTERRUPTED,
     }[solution.status]

@@ -10,6 +10,8 @@ from typing import Annotated
 
 import typer
 
+from .exit_codes import ExitCode
+
 
 @contextmanager
 def _stages(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
@@ -51,8 +53,8 @@ def reproduce_command(
         str,
         typer.Argument(
             metavar="[WHAT]",
-            help="all, one-peak, three-peaks, six-peaks, comparative, repeat, convergence or "
-            "sensitivity.",
+            help="all, one-peak, three-peaks, six-peaks, comparative, repeat, convergence, "
+            "sensitivity or smoothing.",
         ),
     ] = "all",
     quick: Annotated[
@@ -83,6 +85,6 @@ def reproduce_command(
             "the same command goes on from there",
             file=sys.stderr,
         )
-        return 130
+        return ExitCode.INTERRUPTED
     typer.echo(report)
-    return 0
+    return ExitCode.SOLVED

@@ -64,6 +64,24 @@ class Fit:
         return text if self.smoothing is None else f"{text}; {self.smoothing}"
 
 
+# A slope above this is no ground: most often a no-data value that a file does not declare.
+STEEPEST = 1e12
+
+
+def _steepest(data: Peaks | Spline) -> float:
+    """A bound of the weighted slope of every layer, layer units/map unit."""
+    with np.errstate(over="ignore"):
+        if isinstance(data, Peaks):
+            amplitude, falloff = np.abs(data.peaks[:, 0]), data.peaks[:, 1]
+            weights = np.repeat(data.weights, np.diff(data.first))
+            slopes = weights * amplitude * np.sqrt(2.0 * falloff / math.e)
+            return float(slopes.max(initial=0.0))
+        weights = data.weights[:, None, None]
+        along_x = np.abs(np.diff(weights * data.coefficients, axis=2)).max() / data.dx
+        along_y = np.abs(np.diff(weights * data.coefficients, axis=1)).max() / data.dy
+        return float(max(along_x, along_y))
+
+
 EXACT = Fit("exact Gaussian peaks", 0.0, 0.0)
 
 
@@ -104,6 +122,14 @@ class Surface:
     resolution: float  # map units: the size of the smallest features
     nodata: Mask | None = None
     georeference: Georeference | None = None
+
+    def __post_init__(self) -> None:
+        steepest = _steepest(self.data)
+        if not steepest <= STEEPEST:
+            raise InputError(
+                f"the surface has slopes of up to {steepest:.2g}, over {STEEPEST:g}; check the "
+                "units and the weights, and whether a no-data value is not declared as such"
+            )
 
     # Making one
 
