@@ -475,6 +475,7 @@ def test_a_real_map_of_the_moon_is_read(name, band, columns, rows, cell):
     if not path.exists():
         pytest.skip(f"{path} is not here")
     surface = tp.read_surface(path, height_band=band, layers={"rocks": f"{path}:{band + 1}*1000"})
+    assert surface.georeference.name == "the map's own Orthographic projection"
     assert surface.unit == "m"
     assert [str(layer) for layer in surface.layers] == ["height [m]", "rocks x 1000"]
     assert surface.bounds.width == pytest.approx((columns - 1) * cell)

@@ -60,6 +60,9 @@ class Georeference:
     def name(self) -> str:
         """What the plane is, for people."""
         if self.crs == self.map_crs:
+            operation = self.crs.coordinate_operation
+            if self.crs.name in {"unknown", "unnamed"} and operation is not None:
+                return f"the map's own {operation.method_name} projection"
             return str(self.crs.name)
         return f"{self.crs.name} on {self.map_crs.name}"
 
