@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-import json
-import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +12,11 @@ import shapely
 
 import terrapath as tp
 from planner_oracles import TREE_PLANNERS
+from processes import in_another_process
 from terrapath import scenes
 from terrapath._kernels import compiler
 from terrapath.planners import tree_search
 
-HERE = Path(__file__).parent
 KERNELS = Path(compiler.__file__).parent
 
 
@@ -62,22 +58,11 @@ def results(samples=300):
     return found
 
 
-def in_another_process(code="", **environment):
-    """results() and the cache's statistics of a new process."""
-    script = (
-        "import json, test_determinism as t\n"
-        "print(json.dumps([t.results(), t.compiler.cache_statistics()]))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code or script],
-        env={**os.environ, "PYTHONPATH": str(HERE), **environment},
-        cwd=HERE,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+# results() and the cache's statistics
+RESULTS = (
+    "import json, test_determinism as t\n"
+    "print(json.dumps([t.results(), t.compiler.cache_statistics()]))"
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +74,7 @@ def here():
 def cold_and_warm(tmp_path_factory):
     """Two processes, one after the other, that share a kernel cache which was empty."""
     cache = str(tmp_path_factory.mktemp("kernels"))
-    return [in_another_process(NUMBA_CACHE_DIR=cache) for _ in range(2)]
+    return [in_another_process(RESULTS, NUMBA_CACHE_DIR=cache) for _ in range(2)]
 
 
 def assert_same_bits(a, b):
@@ -166,7 +151,7 @@ def test_a_longer_run_begins_as_the_shorter_one(options, monkeypatch):
 
 
 def test_another_process_finds_the_same_bits(here):
-    found, statistics = in_another_process()
+    found, statistics = in_another_process(RESULTS)
     assert found == here
     assert statistics["loaded"] + statistics["compiled"] > 0
 
@@ -186,7 +171,7 @@ def test_a_second_process_compiles_nothing(cold_and_warm):
 
 
 def test_plain_python_agrees_with_the_compiled_kernels(here):
-    found, statistics = in_another_process(NUMBA_DISABLE_JIT="1")
+    found, statistics = in_another_process(RESULTS, NUMBA_DISABLE_JIT="1")
     assert statistics == {"loaded": 0, "compiled": 0}
     assert found.keys() == here.keys()
     for case, expected in here.items():

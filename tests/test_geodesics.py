@@ -5,10 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import math
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,6 +25,7 @@ from oracles import (
     peaks_jets,
     planar_speed,
 )
+from processes import in_another_process
 from terrapath import geodesics, metric, scenes
 from terrapath.geodesics import (
     christoffel_symbols,
@@ -39,7 +36,6 @@ from terrapath.geodesics import (
 )
 from terrapath.validation import Bounds
 
-HERE = Path(__file__).parent
 REGION = Bounds(*scenes.REGION)
 WIDE = Bounds(-100.0, -100.0, 100.0, 100.0)
 ONE_PEAK = [scenes.ONE_PEAK]
@@ -718,22 +714,11 @@ def short_rays():
     return found
 
 
-def in_another_process(**environment):
-    """short_rays() and the cache's statistics of a new process."""
-    script = (
-        "import json, test_geodesics as t; from terrapath._kernels import compiler\n"
-        "print(json.dumps([t.short_rays(), compiler.cache_statistics()]))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env={**os.environ, "PYTHONPATH": str(HERE), **environment},
-        cwd=HERE,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+# short_rays() and the cache's statistics
+RESULTS = (
+    "import json, test_geodesics as t; from terrapath._kernels import compiler\n"
+    "print(json.dumps([t.short_rays(), compiler.cache_statistics()]))"
+)
 
 
 def flattened(nested):
@@ -742,14 +727,14 @@ def flattened(nested):
 
 def test_a_second_process_compiles_nothing_and_finds_the_same_bits():
     here = json.loads(json.dumps(short_rays()))  # which leaves the kernels in the cache
-    found, statistics = in_another_process()
+    found, statistics = in_another_process(RESULTS)
     assert found == here
     assert statistics["compiled"] == 0
     assert statistics["loaded"] > 0
 
 
 def test_plain_python_agrees_with_the_compiled_kernels():
-    found, statistics = in_another_process(NUMBA_DISABLE_JIT="1")
+    found, statistics = in_another_process(RESULTS, NUMBA_DISABLE_JIT="1")
     assert statistics == {"loaded": 0, "compiled": 0}
     np.testing.assert_allclose(flattened(found), flattened(short_rays()), rtol=1e-9, atol=1e-9)
 

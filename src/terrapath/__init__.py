@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from . import metric, scenes
+    from . import geodesics, metric, scenes
     from .errors import FitError, InputError, MapError, OutsideSurfaceError, TerrapathError
     from .free_space import Circle, FreeSpace
     from .io import LayerSource, read_surface, write_route
@@ -75,6 +75,7 @@ __all__ = [
     "__version__",
     "chord",
     "curve_length",
+    "geodesics",
     "line_r",
     "metric",
     "plan",

@@ -355,13 +355,11 @@ def _geodesic(
     It is followed in finer steps than the search took, and where rays spread a thousandfold
     the two end apart by more than the tolerance: so Newton's method goes on with these steps.
     """
-    for _ in range(POLISHING_STEPS):
+    for step in range(POLISHING_STEPS + 1):
         spacing = length / PATH_POINTS
         ray = trace_ray(surface, start, angle, length, longest_step=spacing, **options)
         turn, along, error = _newton_step(surface, ray, target)
-        if not math.isfinite(turn) or error < 1e-14 * length:
+        if step == POLISHING_STEPS or not math.isfinite(turn) or error < 1e-14 * length:
             break
         angle, length = angle + turn, length + along
-    spacing = length / PATH_POINTS
-    ray = trace_ray(surface, start, angle, length, longest_step=spacing, **options)
     return Geodesic(angle, length, ray.points, float(ray.jacobi[-1]), ray.conjugate_points)

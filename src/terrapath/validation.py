@@ -32,6 +32,11 @@ class Bounds(NamedTuple):
         """Extent along x2, map units."""
         return self.x2_max - self.x2_min
 
+    @property
+    def side(self) -> float:
+        """Side of the square that is as large, map units."""
+        return math.sqrt(self.width * self.height)
+
     def contains(self, points: Array) -> npt.NDArray[np.bool_]:
         """Points (..., 2) -> (...) bool."""
         x, y = points[..., 0], points[..., 1]

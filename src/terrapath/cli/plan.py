@@ -159,7 +159,7 @@ def _to_plane(surface: Any, point: tuple[float, float], name: str) -> tuple[floa
     import numpy as np
 
     reference = surface.georeference
-    if reference is None or reference.crs == reference.map_crs:
+    if reference is None or reference.is_map_crs:
         return point
     x, y = reference.from_map(np.array(point))
     inside = surface.bounds is None or surface.bounds.contains(np.array([x, y]))
@@ -176,7 +176,7 @@ def _describe_extent(surface: Any) -> str:
     import numpy as np
 
     reference, bounds = surface.georeference, surface.bounds
-    if reference is None or reference.crs == reference.map_crs:
+    if reference is None or reference.is_map_crs:
         return str(bounds)
     (west, south), (east, north) = reference.to_map(np.array([bounds[:2], bounds[2:]]))
     return f"longitude {west:.5f} to {east:.5f}, latitude {south:.5f} to {north:.5f}"

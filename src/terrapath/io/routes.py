@@ -14,19 +14,13 @@ import numpy as np
 from .. import __version__
 from ..errors import MapError
 from ..files import written_whole
-from ..problem import Problem, Solution
+from ..problem import Solution
 from ..validation import Array
 
 
 def _finite(value: float | None) -> float | None:
     """JSON has no infinity."""
     return None if value is None or not math.isfinite(value) else float(value)
-
-
-def _in_map_coordinates(problem: Problem, points: Array) -> Array | None:
-    """Longitude and latitude of points of the plane; None without a georeference."""
-    reference = problem.surface.georeference
-    return None if reference is None else reference.to_lonlat(points)
 
 
 def route_record(solution: Solution) -> dict[str, Any]:
@@ -104,9 +98,9 @@ def _write_csv(solution: Solution, file: Path) -> None:
         "x1": profile.points[:, 0],
         "x2": profile.points[:, 1],
     }
-    lonlat = _in_map_coordinates(solution.problem, profile.points)
-    if lonlat is not None:
-        columns["longitude"], columns["latitude"] = lonlat.T
+    reference = solution.problem.surface.georeference
+    if reference is not None:
+        columns["longitude"], columns["latitude"] = reference.to_lonlat(profile.points).T
     for layer, values in zip(solution.problem.surface.layers, profile.values.T, strict=True):
         columns[f"{layer.name} [{layer.unit}]" if layer.unit else layer.name] = values
     with file.open("w", newline="", encoding="utf-8") as stream:

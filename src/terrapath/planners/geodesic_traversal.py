@@ -116,7 +116,7 @@ class GeodesicTraversal:
         return np.linspace(first, last, self.directions)
 
     def _radius(self, problem: Problem) -> float:
-        return self.radius or NEAR_SHARE * _side(problem)
+        return self.radius or NEAR_SHARE * problem.bounds.side
 
     def _trace(self, problem: Problem, angle: float) -> Ray:
         return trace_ray(
@@ -125,7 +125,7 @@ class GeodesicTraversal:
             angle,
             LONGEST_SHARE * problem.straight_length,
             bounds=problem.bounds,
-            longest_step=_side(problem) / STEPS_PER_SIDE,
+            longest_step=problem.bounds.side / STEPS_PER_SIDE,
             tolerance=self.tolerance,
         )
 
@@ -187,11 +187,6 @@ class GeodesicTraversal:
             stopped_by=_explain(fan),
             alternatives=paths[1:],
         )
-
-
-def _side(problem: Problem) -> float:
-    """Side of the square as large as the region, map units."""
-    return math.sqrt(problem.bounds.width * problem.bounds.height)
 
 
 def _is_free(problem: Problem, geodesic: Geodesic) -> bool:

@@ -46,7 +46,7 @@ class TreeOptions:
 
 def default_step(problem: Problem) -> float:
     """A step that suits the region, map units."""
-    return math.sqrt(problem.bounds.width * problem.bounds.height) / STEPS_PER_SIDE
+    return problem.bounds.side / STEPS_PER_SIDE
 
 
 def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:

@@ -112,6 +112,17 @@ def fit_grid(values: Array, x: Array, y: Array, weights: Array, scale: float) ->
     return GridFit(spline, error, change)
 
 
+def _require_finite(name: str, values: Array, x: Array, y: Array) -> None:
+    """Raise InputError with the place where values (..., *x.shape) are not finite."""
+    if np.isfinite(values).all():
+        return
+    place = tuple(np.argwhere(~np.isfinite(values))[0][values.ndim - x.ndim :])
+    raise InputError(
+        f"{name} is not finite at x1={x[place]:g}, x2={y[place]:g}; "
+        "shrink the bounds to where it is defined"
+    )
+
+
 def _checked(f: Function, x: Array, y: Array) -> Array:
     """f(x, y) as (layers, ...), finite, or an error that names the place."""
     values = np.asarray(f(x, y), dtype=np.float64)
@@ -122,12 +133,7 @@ def _checked(f: Function, x: Array, y: Array) -> Array:
             f"f returned shape {values.shape} for arrays of shape {x.shape}; "
             "it must return (layers, ...) on arrays"
         )
-    if not np.isfinite(values).all():
-        place = tuple(np.argwhere(~np.isfinite(values))[0][1:])
-        raise InputError(
-            f"f is not finite at x1={x[place]:g}, x2={y[place]:g}; "
-            "shrink the bounds to where it is defined"
-        )
+    _require_finite("f", values, x, y)
     return values
 
 
@@ -161,12 +167,7 @@ def _exact_gradient(gradient: Gradient, layers: int) -> Gradient:
                 f"gradient returned shape {slopes.shape} for arrays of shape {x.shape}; "
                 f"it must return {(2, layers, *x.shape)}: d/dx1 and d/dx2 of each layer"
             )
-        if not np.isfinite(slopes).all():
-            place = tuple(np.argwhere(~np.isfinite(slopes))[0][2:])
-            raise InputError(
-                f"gradient is not finite at x1={x[place]:g}, x2={y[place]:g}; "
-                "shrink the bounds to where it is defined"
-            )
+        _require_finite("gradient", slopes, x, y)
         return slopes
 
     return checked

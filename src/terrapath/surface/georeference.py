@@ -43,6 +43,11 @@ class Georeference:
         return cls(parsed, parsed)
 
     @property
+    def is_map_crs(self) -> bool:
+        """Is the map planned in the CRS that it came in?"""
+        return bool(self.crs == self.map_crs)
+
+    @property
     def unit(self) -> str:
         """Unit of the plane."""
         name = self.crs.axis_info[0].unit_name if self.crs.axis_info else ""
@@ -59,7 +64,7 @@ class Georeference:
     @property
     def name(self) -> str:
         """What the plane is, for people."""
-        if self.crs == self.map_crs:
+        if self.is_map_crs:
             operation = self.crs.coordinate_operation
             if self.crs.name in {"unknown", "unnamed"} and operation is not None:
                 return f"the map's own {operation.method_name} projection"
