@@ -1,0 +1,407 @@
+"""The distance field: the eikonal equation of h on a lattice, by fast marching."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from . import metric
+from ._kernels import eikonal as kernels
+from .errors import InputError
+from .free_space import FreeSpace, Obstacle
+from .lattice import Lattice
+from .problem import Path, Problem
+from .surface import Surface
+from .validation import Array, Bounds, as_array, as_points
+
+# The default spacing of the nodes is this share of the region's longer side.
+NODES_PER_SIDE = 250
+
+# Nodes this near to the source, in nodes, take the source model's value.
+SEED_RADIUS = 3.0
+# Differences are factored by the source model this far around the source, in nodes, or as far
+# as the surface has one feature, for the model knows no more.
+WINDOW_RADIUS = 20
+
+# A bucket of the queue is this share of a node's spacing, over the nodes of a side.
+BUCKET_SHARE = 4.0
+BUCKETS = 2**14
+
+# Nodes settled between two looks at the callback and Ctrl-C.
+CHUNK = 100_000
+
+# Steps of a path back to the source, in nodes.
+STEP = 0.5
+
+# Vectors of stencils are kept in 16 bits.
+LONGEST_SIDE = 2**15 - 1
+
+Nodes = npt.NDArray[np.int64]
+# Sees how many nodes are settled; returning True stops the march.
+Watch = Callable[[int], bool | None]
+
+
+class SourceModel(NamedTuple):
+    """The distance from the source nearby, as far as it is known in closed form."""
+
+    row: int
+    column: int
+    values: Array  # (rows, columns), map units, NaN where it does not hold
+    slope_x: Array  # per node
+    slope_y: Array
+    seeds: Nodes  # node numbers
+    seed_values: Array  # map units
+
+
+def near_distance(surface: Surface, source: tuple[float, float], points: Array) -> Array:
+    """Distance under h from a source to points (..., 2) nearby, map units.
+
+    The square of a geodesic's length is that of its chord c plus |II(c, c)|^2 / 12, II being
+    the second fundamental form, here at the middle: the relative error is of fourth order.
+    """
+    offsets = points - np.asarray(source)
+    middle = np.asarray(source) + 0.5 * offsets
+    chords = surface.lift(points) - surface.lift(np.asarray(source))
+    weights = surface.data.weights
+    bends = np.einsum("...i,...kij,...j->...k", offsets, surface.hessians(middle), offsets) * weights
+    pull = np.einsum("...k,...ki->...i", bends * weights, surface.gradients(middle))
+    inverse = metric.inverse_metric_tensor(surface, middle)
+    normal = np.square(bends).sum(-1) - np.einsum("...i,...ij,...j->...", pull, inverse, pull)
+    squared = np.square(chords).sum(-1)
+    # On rough ground the formula knows nothing past the next bump: then it adds little.
+    return np.asarray(np.sqrt(squared + np.minimum(np.maximum(normal, 0.0) / 12.0, 0.05 * squared)))
+
+
+def model_source(
+    lattice: Lattice,
+    source: tuple[float, float],
+    radius: float,
+    distance: Callable[[Array], Array],
+    is_visible: Callable[[Array], npt.NDArray[np.bool_]] | None = None,
+) -> SourceModel:
+    """The model on all nodes within ``radius`` nodes of the source, in rows and columns.
+
+    distance : points (..., 2) -> (...), map units. is_visible : points (m, 2) -> (m,) bool.
+    """
+    column = (source[0] - lattice.bounds.x1_min) / lattice.dx
+    row = (source[1] - lattice.bounds.x2_min) / lattice.dy
+    columns = np.arange(max(math.floor(column - radius), 0), min(column + radius + 1, lattice.nx))
+    rows = np.arange(max(math.floor(row - radius), 0), min(row + radius + 1, lattice.ny))
+    columns, rows = columns.astype(np.int64), rows.astype(np.int64)
+    points = np.stack(np.meshgrid(lattice.x[columns], lattice.y[rows]), axis=-1)
+    values = distance(points)
+    if is_visible is not None:
+        values[~is_visible(points.reshape(-1, 2)).reshape(values.shape)] = np.nan
+    slopes = [_slope(distance, points, lattice, axis) for axis in range(2)]
+    steps = np.hypot(*np.meshgrid(columns - column, rows - row))
+    planted = (steps <= SEED_RADIUS) & ~np.isnan(values)
+    seeds = (rows[:, None] * lattice.nx + columns)[planted]
+    return SourceModel(int(rows[0]), int(columns[0]), values, *slopes, seeds, values[planted])
+
+
+def _slope(
+    distance: Callable[[Array], Array], points: Array, lattice: Lattice, axis: int
+) -> Array:
+    """Derivative of the distance along an axis, per node, by central differences."""
+    nodes = 1e-4  # near enough, and far above rounding
+    step = np.zeros(2)
+    step[axis] = nodes * (lattice.dx, lattice.dy)[axis]
+    bounds = lattice.bounds
+    ahead = np.clip(points + step, bounds[:2], bounds[2:])
+    behind = np.clip(points - step, bounds[:2], bounds[2:])
+    width = (ahead - behind)[..., axis] / (lattice.dx, lattice.dy)[axis]
+    return np.asarray((distance(ahead) - distance(behind)) / width)
+
+
+class Medium:
+    """A metric on a lattice, laid out for fast marching from any source.
+
+    shrink : (ny, nx), factors of lengths, at most 1; the metric is h times their square.
+    """
+
+    def __init__(self, lattice: Lattice, nodes: Any, free_space: FreeSpace | None = None) -> None:
+        self.lattice = lattice
+        self.nodes = nodes
+        if free_space is not None and free_space.has_obstacles:
+            kernels.cut_links(free_space.data, lattice.data, nodes)
+        self.readers = self._readers()
+
+    @classmethod
+    def of_surface(
+        cls, surface: Surface, lattice: Lattice, free_space: FreeSpace | None = None
+    ) -> Medium:
+        """The metric h of a surface."""
+        nodes = _allocate(lattice)
+        kernels.lay_surface_stencils(surface.data, lattice.data, nodes)
+        return cls(lattice, nodes, free_space)
+
+    @classmethod
+    def of_tensors(cls, tensors: Any, lattice: Lattice) -> Medium:
+        """Any Riemannian metric: tensors (ny, nx, 3) hold h11, h12, h22 at the nodes."""
+        given = as_array(tensors, "tensors", shape=(lattice.ny, lattice.nx, 3))
+        if not (given[..., 0] * given[..., 2] > given[..., 1] ** 2).all():
+            raise InputError("tensors hold one that is not positive definite; check their order")
+        nodes = _allocate(lattice)
+        kernels.lay_tensor_stencils(given, lattice.data, nodes)
+        return cls(lattice, nodes)
+
+    def _readers(self) -> kernels.Readers:
+        first = np.zeros(len(self.nodes) + 1, np.int64)
+        kernels.count_readers(self.nodes, self.lattice.nx, first)
+        np.cumsum(first, out=first)
+        entries = np.empty(first[-1], np.uint32)
+        ends = first[:-1].astype(np.int32)
+        kernels.list_readers(self.nodes, self.lattice.nx, ends, entries)
+        return kernels.Readers(first.astype(np.int32), entries)
+
+    def march(
+        self, model: SourceModel, *, limit: float = math.inf, watch: Watch | None = None
+    ) -> Array:
+        """Distances (ny, nx) from the source, map units; infinite where not reached.
+
+        limit : nodes farther than this are not settled, map units.
+        """
+        lattice = self.lattice
+        source = kernels.Source(*model[:5])
+        front = self._front(model)
+        rows = slice(model.row, model.row + model.values.shape[0])
+        columns = slice(model.column, model.column + model.values.shape[1])
+        window = self.nodes.links.reshape(lattice.ny, lattice.nx)[rows, columns]
+        window[~np.isnan(model.values)] |= kernels.WINDOW
+        try:
+            kernels.plant(
+                self.nodes, front, self.readers, lattice.nx, model.seeds, model.seed_values
+            )
+            self._settle(front, source, limit, watch)
+        finally:
+            window &= ~np.uint16(kernels.WINDOW)
+        return front.u.reshape(lattice.ny, lattice.nx)
+
+    def _front(self, model: SourceModel) -> kernels.Front:
+        lattice, count = self.lattice, len(self.nodes)
+        width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
+        front = kernels.Front(
+            u=np.full(count, np.inf),
+            trial=np.full(count, np.inf),
+            heads=np.full(BUCKETS, -1, np.int32),
+            days_per_unit=1.0 / width,
+            counters=np.zeros(2, np.int64),
+        )
+        if len(model.seeds):
+            front.counters[kernels.DAY] = int(model.seed_values.min() / width)
+        return front
+
+    def _settle(
+        self, front: kernels.Front, source: kernels.Source, limit: float, watch: Watch | None
+    ) -> None:
+        settled = 0
+        while True:
+            chunk = kernels.march(
+                self.nodes, front, self.readers, source, self.lattice.nx, CHUNK, float(limit)
+            )
+            settled += chunk
+            if chunk < CHUNK or (watch is not None and watch(settled)):
+                return
+
+
+def _allocate(lattice: Lattice) -> Any:
+    if max(lattice.nx, lattice.ny) > LONGEST_SIDE:
+        raise InputError(
+            f"the lattice has {lattice.nx:,} x {lattice.ny:,} nodes, more than {LONGEST_SIDE:,} "
+            "on a side; give a wider spacing"
+        )
+    return np.zeros(lattice.nx * lattice.ny, kernels.NODE).view(np.recarray)
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceField:
+    """Distances under h from one source, at the nodes of a lattice.
+
+    values : (ny, nx), map units, infinite where no path was found on the lattice.
+    """
+
+    surface: Surface
+    free_space: FreeSpace
+    source: tuple[float, float]
+    medium: Medium
+    values: Array
+
+    @property
+    def lattice(self) -> Lattice:
+        """Where the values lie."""
+        return self.medium.lattice
+
+    def at(self, points: Any) -> Array:
+        """Distances from the source to points (..., 2), map units; infinite where not reached.
+
+        Cubic in smooth places; near obstacles and the source, the least of what the visible
+        nodes around offer.
+        """
+        array = as_points(points)
+        flat = np.ascontiguousarray(array.reshape(-1, 2))
+        values = np.empty(len(flat))
+        kernels.fill_interpolated(self.lattice.data, self.values, flat, values)
+        for m in np.flatnonzero(~np.isfinite(values) | self._is_near_source(flat)):
+            values[m] = self._at_visible(flat[m])[0]
+        return values.reshape(array.shape[:-1])
+
+    def _is_near_source(self, points: Array) -> npt.NDArray[np.bool_]:
+        offsets = (points - np.asarray(self.source)) / (self.lattice.dx, self.lattice.dy)
+        return np.asarray(np.hypot(*offsets.T) <= SEED_RADIUS)
+
+    def _around(self, point: Array) -> tuple[Nodes, Array]:
+        """Numbers and points of the settled nodes near a point that can be seen from it."""
+        lattice, reach = self.lattice, int(SEED_RADIUS)
+        column = int((point[0] - lattice.bounds.x1_min) / lattice.dx)
+        row = int((point[1] - lattice.bounds.x2_min) / lattice.dy)
+        columns = np.arange(max(column - reach, 0), min(column + reach + 2, lattice.nx))
+        rows = np.arange(max(row - reach, 0), min(row + reach + 2, lattice.ny))
+        numbers = (rows[:, None] * lattice.nx + columns).ravel()
+        numbers = numbers[np.isfinite(self.values.ravel()[numbers])]
+        points = np.column_stack(
+            [lattice.x[numbers % lattice.nx], lattice.y[numbers // lattice.nx]]
+        )
+        ends = np.broadcast_to(point, points.shape)
+        visible = self.free_space.segments_are_free(ends, points)
+        return numbers[visible], points[visible]
+
+    def _at_visible(self, point: Array) -> tuple[float, int]:
+        """The distance by way of the best visible node, and that node; -1 for the source."""
+        numbers, points = self._around(point)
+        ends = np.broadcast_to(point, points.shape)
+        best, node = math.inf, -1
+        if len(numbers):
+            lengths = self.values.ravel()[numbers] + metric.segment_lengths(
+                self.surface, points, ends
+            )
+            best, node = float(lengths.min()), int(numbers[lengths.argmin()])
+        source = np.asarray(self.source)
+        seen = self.free_space.segments_are_free(source[None], point[None])[0]
+        if seen and self._is_near_source(point[None])[0]:
+            direct = float(near_distance(self.surface, self.source, point))
+            if direct < best:
+                return direct, -1
+        return best, node
+
+    def path_to(self, goal: Any) -> Path | None:
+        """The path down the field from the source to a goal; None where there is none.
+
+        Steepest descent under h where the field is smooth and the way is free; otherwise from
+        node to node.
+        """
+        (end,) = as_points([goal], "goal")
+        if not math.isfinite(self.at(end)):
+            return None
+        points = self._descend(end)
+        if points is None or not self._is_free(points):
+            points = self._follow_links(end)
+        return None if points is None else Path(self.surface, points[::-1].copy())
+
+    def _is_free(self, points: Array) -> bool:
+        return bool(self.free_space.segments_are_free(points[:-1], points[1:]).all())
+
+    def _descend(self, goal: Array) -> Array | None:
+        """From the goal to the source, (m, 2)."""
+        lattice = self.lattice
+        if min(lattice.nx, lattice.ny) < 4:
+            return None
+        spacing = min(lattice.dx, lattice.dy)
+        step, near = STEP * spacing, 2.0 * spacing
+        # No shortest path is longer on the plane than its length on the surface.
+        room = int(1.2 * float(self.at(goal)) / step) + 16
+        points = np.empty((room, 2))
+        points[0] = goal
+        count = kernels.trace_descent(
+            self.surface.data, lattice.data, self.values, *self.source, near, step, points
+        )
+        if count == 0:
+            return None
+        return np.concatenate([points[:count], [self.source]])
+
+    def _follow_links(self, goal: Array) -> Array | None:
+        """As ``_descend``, from node to node, in free space wherever the links are."""
+        _, node = self._at_visible(goal)
+        if node < 0:
+            return np.array([goal, self.source])
+        trail = np.empty(len(self.medium.nodes), np.int64)
+        count = kernels.trace_links(
+            self.surface.data,
+            self.lattice.data,
+            self.medium.nodes,
+            self.values.ravel(),
+            node,
+            trail,
+        )
+        numbers = trail[:count]
+        nx = self.lattice.nx
+        points = np.column_stack([self.lattice.x[numbers % nx], self.lattice.y[numbers // nx]])
+        points = np.concatenate([goal[None], points, [self.source]])
+        return points if self._is_free(points) else None
+
+    @cached_property
+    def reached(self) -> float:
+        """Share of the nodes that were reached."""
+        return float(np.isfinite(self.values).mean())
+
+
+def default_spacing(bounds: Bounds) -> float:
+    """A spacing of nodes that suits a region, map units."""
+    return max(bounds.width, bounds.height) / NODES_PER_SIDE
+
+
+def march_from(
+    surface: Surface,
+    free_space: FreeSpace,
+    source: tuple[float, float],
+    medium: Medium,
+    *,
+    limit: float = math.inf,
+    watch: Watch | None = None,
+) -> DistanceField:
+    """The distance field of one source through a medium that is laid out already."""
+    spacing = max(medium.lattice.dx, medium.lattice.dy)
+    features = 2.0 * surface.resolution / spacing
+    radius = min(max(features, SEED_RADIUS + 1.0), WINDOW_RADIUS)
+
+    def is_visible(points: Array) -> npt.NDArray[np.bool_]:
+        starts = np.broadcast_to(np.asarray(source), points.shape)
+        return free_space.segments_are_free(starts, points)
+
+    model = model_source(
+        medium.lattice,
+        source,
+        radius,
+        lambda points: near_distance(surface, source, points),
+        is_visible if free_space.has_obstacles else None,
+    )
+    values = medium.march(model, limit=limit, watch=watch)
+    return DistanceField(surface, free_space, source, medium, values)
+
+
+def distance_field(
+    surface: Surface,
+    start: Any,
+    *,
+    bounds: Any = None,
+    obstacles: Iterable[Obstacle] = (),
+    spacing: float | None = None,
+    watch: Watch | None = None,
+) -> DistanceField:
+    """Distances on the surface from a start to everywhere, by fast marching.
+
+    start : (x1, x2), map units, in free space. bounds, obstacles : as of ``Problem``.
+    spacing : of the nodes, map units; by default a 250th of the region's longer side.
+    watch : now and then called with the number of settled nodes; returning True stops.
+    Raises OutsideSurfaceError or InputError, naming the value and the remedy.
+    """
+    problem = Problem(surface, start, start, bounds, obstacles)
+    chosen = default_spacing(problem.bounds) if spacing is None else spacing
+    lattice = Lattice.spanning(problem.bounds, chosen)
+    medium = Medium.of_surface(surface, lattice, problem.free_space)
+    return march_from(surface, problem.free_space, problem.start, medium, watch=watch)
