@@ -190,6 +190,9 @@ BAD_ARGUMENTS = {
         "radius_factor",
         "rrt",
     ),
+    "option of grid planners": (["six-peaks", "--spacing", "0.1"], "spacing", "step"),
+    "too many nodes": (["six-peaks", "--planner", "a-star", "--spacing", "1e-6"], "wider"),
+    "five neighbours": (["six-peaks", "--planner", "a-star", "--neighbours", "5"], "neighbours=5"),
     "misspelt option": (["six-peaks", "--plannr", "rrt"], "--plannr", "--planner"),
     "layer on a scene": (["six-peaks", "--layer", "a=b.tif"], "--layer", "six-peaks"),
     "unknown weight": (["six-peaks", "--weight", "foo=3"], "foo", "resistance"),
@@ -267,7 +270,8 @@ def test_no_path_within_the_limits_exits_with_3_and_writes_nothing(tmp_path, cap
     assert answer["length"] is None
 
 
-def test_an_enclosed_goal_exits_with_3(tmp_path, capsys):
+@pytest.mark.parametrize("planner", ["rrt-star-r", "rrt", "a-star"])
+def test_an_enclosed_goal_exits_with_4(planner, tmp_path, capsys):
     heights = np.zeros((40, 40))
     heights[8:20, 8:20] = -9999.0
     heights[12:16, 12:16] = 0.0
@@ -276,8 +280,26 @@ def test_an_enclosed_goal_exits_with_3(tmp_path, capsys):
     profile |= {"transform": from_origin(0.0, 40.0, 1.0, 1.0), "crs": "EPSG:32617"}
     with rasterio.open(path, "w", nodata=-9999.0, **profile) as dataset:
         dataset.write(heights, 1)
-    assert run(["plan", str(path), "--start", "35,5", "--goal", "14,26", *FAST]) == 3
-    assert "enclosed" in capsys.readouterr().err
+    asked = [str(path), "--start", "35,5", "--goal", "14,26", "--planner", planner]
+    assert run(["plan", *asked]) == 4
+    captured = capsys.readouterr()
+    assert "unreachable" in captured.out
+    assert "no path exists" in captured.err
+    assert "different parts of the free space" in captured.err
+    code, answer = json_of(capsys, *asked)
+    assert code == 4
+    assert answer["status"] == "unreachable"
+    assert answer["path"] is answer["length"] is answer["lower_bound"] is None
+
+
+def test_grid_planners_take_their_options(capsys):
+    asked = ["one-peak", "--spacing", "0.4", "--neighbours", "8", "--planner"]
+    answers = [json_of(capsys, *asked, name) for name in ("dijkstra", "a-star")]
+    assert [code for code, _ in answers] == [0, 0]
+    assert answers[0][1]["cost"] == pytest.approx(answers[1][1]["cost"], rel=1e-14)
+    assert answers[0][1]["seed"] is None
+    expected = tp.AStar(spacing=0.4, neighbours=8).solve(tp.scenes.load("one-peak"))
+    assert answers[1][1]["path"] == expected.path.points.tolist()
 
 
 def test_ctrl_c_exits_with_130_and_writes_the_best_so_far(tmp_path):

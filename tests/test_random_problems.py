@@ -209,6 +209,21 @@ def check_path(case, problem, solution):
         assert solution.length == pytest.approx(expected, rel=1e-9)
 
 
+def check_separated(case):
+    """Start and goal lie in different parts of what the obstacles leave, by shapely alone.
+
+    A disc is a polygon inside it here, which leaves more.
+    """
+    discs = [shapely.Point(x, y).buffer(radius, 256) for x, y, radius in case.circles]
+    ground = shapely.box(*BOUNDS) - shapely.union_all([*case.polygons, *discs])
+    parts = shapely.get_parts(ground)
+    of_start, of_goal = (
+        shapely.intersects_xy(parts, *point).nonzero()[0] for point in (case.start, case.goal)
+    )
+    assert len(of_start) == len(of_goal) == 1
+    assert of_start[0] != of_goal[0]
+
+
 def options_of(case):
     """Algorithm 1 to the letter where a planner has the choice, so that edges can be checked."""
     options = dict(case.options)
@@ -223,6 +238,10 @@ def check(case):
         tp.plan(problem, case.planner, samples=samples, seed=case.seed, **options)
         for samples in (case.samples, 2 * case.samples)
     )
+    if problem.is_unreachable:
+        assert short.status is long.status is tp.Status.UNREACHABLE
+        check_separated(case)
+        return False
     for solution in (short, long):
         check_tree(case, problem, solution)
         found = solution.history.best_cost[np.isfinite(solution.history.best_cost)]

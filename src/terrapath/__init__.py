@@ -13,17 +13,46 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from . import geodesics, metric, scenes
-    from .errors import FitError, InputError, MapError, OutsideSurfaceError, TerrapathError
+    from .distinct_routes import alternatives
+    from .bounding import lower_bound
+    from .certificate import Certificate
+    from .eikonal import DistanceField, distance_field
+    from .errors import (
+        CertificateError,
+        FitError,
+        InputError,
+        MapError,
+        OutsideSurfaceError,
+        TerrapathError,
+    )
     from .free_space import Circle, FreeSpace
     from .io import LayerSource, read_surface, write_route
+    from .lattice import Lattice
     from .metric import chord, curve_length, line_r
-    from .planners import RRT, GeodesicTraversal, Progress, RRTStar, plan
+    from .planners import (
+        RRT,
+        AStar,
+        Dijkstra,
+        FastMarching,
+        GeodesicTraversal,
+        Optimal,
+        Progress,
+        RRTStar,
+        plan,
+    )
     from .plotting import plot_route
     from .problem import Path, Problem, Solution, Status
+    from .refinement import refine
     from .surface import Layer, Mask, Surface
 
 # Each name of the public face, and the module it lives in.
 _HOMES = {
+    "alternatives": "distinct_routes",
+    "lower_bound": "bounding",
+    "Certificate": "certificate",
+    "DistanceField": "eikonal",
+    "distance_field": "eikonal",
+    "CertificateError": "errors",
     "FitError": "errors",
     "InputError": "errors",
     "MapError": "errors",
@@ -34,10 +63,15 @@ _HOMES = {
     "LayerSource": "io",
     "read_surface": "io",
     "write_route": "io",
+    "Lattice": "lattice",
     "chord": "metric",
     "curve_length": "metric",
     "line_r": "metric",
+    "AStar": "planners",
+    "Dijkstra": "planners",
+    "FastMarching": "planners",
     "GeodesicTraversal": "planners",
+    "Optimal": "planners",
     "RRT": "planners",
     "RRTStar": "planners",
     "Progress": "planners",
@@ -47,6 +81,7 @@ _HOMES = {
     "Problem": "problem",
     "Solution": "problem",
     "Status": "problem",
+    "refine": "refinement",
     "Layer": "surface",
     "Mask": "surface",
     "Surface": "surface",
@@ -54,15 +89,23 @@ _HOMES = {
 
 __all__ = [
     "RRT",
+    "AStar",
+    "Certificate",
+    "CertificateError",
     "Circle",
+    "Dijkstra",
+    "DistanceField",
+    "FastMarching",
     "FitError",
     "FreeSpace",
     "GeodesicTraversal",
     "InputError",
+    "Lattice",
     "Layer",
     "LayerSource",
     "MapError",
     "Mask",
+    "Optimal",
     "OutsideSurfaceError",
     "Path",
     "Problem",
@@ -73,14 +116,18 @@ __all__ = [
     "Surface",
     "TerrapathError",
     "__version__",
+    "alternatives",
     "chord",
     "curve_length",
+    "distance_field",
     "geodesics",
     "line_r",
+    "lower_bound",
     "metric",
     "plan",
     "plot_route",
     "read_surface",
+    "refine",
     "scenes",
     "write_route",
 ]

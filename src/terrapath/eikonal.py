@@ -15,13 +15,10 @@ from . import metric
 from ._kernels import eikonal as kernels
 from .errors import InputError
 from .free_space import FreeSpace, Obstacle
-from .lattice import Lattice
+from .lattice import Lattice, default_spacing
 from .problem import Path, Problem
 from .surface import Surface
-from .validation import Array, Bounds, as_array, as_points
-
-# The default spacing of the nodes is this share of the region's longer side.
-NODES_PER_SIDE = 250
+from .validation import Array, as_array, as_points
 
 # Nodes this near to the source, in nodes, take the source model's value.
 SEED_RADIUS = 3.0
@@ -69,7 +66,9 @@ def near_distance(surface: Surface, source: tuple[float, float], points: Array) 
     middle = np.asarray(source) + 0.5 * offsets
     chords = surface.lift(points) - surface.lift(np.asarray(source))
     weights = surface.data.weights
-    bends = np.einsum("...i,...kij,...j->...k", offsets, surface.hessians(middle), offsets) * weights
+    bends = (
+        np.einsum("...i,...kij,...j->...k", offsets, surface.hessians(middle), offsets) * weights
+    )
     pull = np.einsum("...k,...ki->...i", bends * weights, surface.gradients(middle))
     inverse = metric.inverse_metric_tensor(surface, middle)
     normal = np.square(bends).sum(-1) - np.einsum("...i,...ij,...j->...", pull, inverse, pull)
@@ -98,16 +97,16 @@ def model_source(
     values = distance(points)
     if is_visible is not None:
         values[~is_visible(points.reshape(-1, 2)).reshape(values.shape)] = np.nan
-    slopes = [_slope(distance, points, lattice, axis) for axis in range(2)]
+    slope_x, slope_y = (_slope(distance, points, lattice, axis) for axis in range(2))
     steps = np.hypot(*np.meshgrid(columns - column, rows - row))
     planted = (steps <= SEED_RADIUS) & ~np.isnan(values)
     seeds = (rows[:, None] * lattice.nx + columns)[planted]
-    return SourceModel(int(rows[0]), int(columns[0]), values, *slopes, seeds, values[planted])
+    return SourceModel(
+        int(rows[0]), int(columns[0]), values, slope_x, slope_y, seeds, values[planted]
+    )
 
 
-def _slope(
-    distance: Callable[[Array], Array], points: Array, lattice: Lattice, axis: int
-) -> Array:
+def _slope(distance: Callable[[Array], Array], points: Array, lattice: Lattice, axis: int) -> Array:
     """Derivative of the distance along an axis, per node, by central differences."""
     nodes = 1e-4  # near enough, and far above rounding
     step = np.zeros(2)
@@ -120,26 +119,36 @@ def _slope(
 
 
 class Medium:
-    """A metric on a lattice, laid out for fast marching from any source.
+    """A metric on a lattice, laid out for fast marching from any source."""
 
-    shrink : (ny, nx), factors of lengths, at most 1; the metric is h times their square.
-    """
-
-    def __init__(self, lattice: Lattice, nodes: Any, free_space: FreeSpace | None = None) -> None:
+    def __init__(self, lattice: Lattice, nodes: Any) -> None:
         self.lattice = lattice
         self.nodes = nodes
-        if free_space is not None and free_space.has_obstacles:
-            kernels.cut_links(free_space.data, lattice.data, nodes)
         self.readers = self._readers()
 
     @classmethod
     def of_surface(
         cls, surface: Surface, lattice: Lattice, free_space: FreeSpace | None = None
     ) -> Medium:
-        """The metric h of a surface."""
+        """The metric h of a surface; no link between nodes touches an obstacle."""
         nodes = _allocate(lattice)
         kernels.lay_surface_stencils(surface.data, lattice.data, nodes)
-        return cls(lattice, nodes, free_space)
+        if free_space is not None and free_space.has_obstacles:
+            kernels.cut_links(free_space.data, lattice.data, nodes)
+        return cls(lattice, nodes)
+
+    @classmethod
+    def around(cls, surface: Surface, lattice: Lattice, blocked: npt.NDArray[np.bool_]) -> Medium:
+        """The metric h of a surface; only the ``blocked`` nodes (ny, nx) are left out."""
+        nodes = _allocate(lattice)
+        kernels.lay_surface_stencils(surface.data, lattice.data, nodes)
+        if blocked.any():
+            kernels.block_nodes(lattice.data, blocked.ravel().astype(np.uint8), nodes)
+        return cls(lattice, nodes)
+
+    def shrink(self, factors: Array) -> None:
+        """Multiply lengths at the nodes by factors (ny, nx), for good."""
+        kernels.shrink_metric(self.nodes, np.ascontiguousarray(factors, np.float64).ravel())
 
     @classmethod
     def of_tensors(cls, tensors: Any, lattice: Lattice) -> Medium:
@@ -350,9 +359,10 @@ class DistanceField:
         return float(np.isfinite(self.values).mean())
 
 
-def default_spacing(bounds: Bounds) -> float:
-    """A spacing of nodes that suits a region, map units."""
-    return max(bounds.width, bounds.height) / NODES_PER_SIDE
+def window_radius(surface: Surface, lattice: Lattice) -> float:
+    """How far around the source its model is used, in nodes."""
+    features = 2.0 * surface.resolution / max(lattice.dx, lattice.dy)
+    return min(max(features, SEED_RADIUS + 1.0), WINDOW_RADIUS)
 
 
 def march_from(
@@ -365,9 +375,6 @@ def march_from(
     watch: Watch | None = None,
 ) -> DistanceField:
     """The distance field of one source through a medium that is laid out already."""
-    spacing = max(medium.lattice.dx, medium.lattice.dy)
-    features = 2.0 * surface.resolution / spacing
-    radius = min(max(features, SEED_RADIUS + 1.0), WINDOW_RADIUS)
 
     def is_visible(points: Array) -> npt.NDArray[np.bool_]:
         starts = np.broadcast_to(np.asarray(source), points.shape)
@@ -376,7 +383,7 @@ def march_from(
     model = model_source(
         medium.lattice,
         source,
-        radius,
+        window_radius(surface, medium.lattice),
         lambda points: near_distance(surface, source, points),
         is_visible if free_space.has_obstacles else None,
     )

@@ -19,3 +19,7 @@ class FitError(InputError):
 
 class MapError(TerrapathError):
     """A file that cannot be read as a map, or written."""
+
+
+class CertificateError(TerrapathError):
+    """A certificate that does not prove what it claims."""

@@ -14,12 +14,17 @@ from shapely.geometry.base import BaseGeometry
 
 from ._kernels import free_space as kernels
 from .errors import InputError
+from .lattice import Lattice
+from .separation import separated
 from .surface import Mask
-from .validation import Array, Bounds, as_array, require_positive
+from .validation import Array, Bounds, as_array, as_point, require_positive
 
 # Around two edges a cell keeps the lists short and the index small.
 EDGES_PER_CELL = 2.0
 MOST_CELLS_A_SIDE = 1024
+
+# Corners of the polygon inside a disc that stands for it where separation is to be proven.
+CORNERS_OF_DISC = 64
 
 
 @dataclass(frozen=True)
@@ -35,8 +40,17 @@ class Circle:
         if not (math.isfinite(self.x1) and math.isfinite(self.x2)):
             raise InputError(f"the centre ({self.x1}, {self.x2}) of a circle is not finite")
 
+    @property
+    def inscribed(self) -> shapely.Polygon:
+        """A polygon that lies wholly in the disc, rounding allowed for."""
+        # Turned, so that corners of equal discs are not within rounding of one another's sides.
+        angles = 0.1 + np.linspace(0.0, 2.0 * math.pi, CORNERS_OF_DISC, endpoint=False)
+        ring = np.column_stack([np.cos(angles), np.sin(angles)])
+        return shapely.Polygon((self.x1, self.x2) + self.radius * (1.0 - 1e-9) * ring)
+
 
 Obstacle: TypeAlias = BaseGeometry | Circle | Mask
+_Patch: TypeAlias = tuple[Any, npt.NDArray[np.bool_]]
 Indices: TypeAlias = npt.NDArray[np.int64]
 
 
@@ -61,13 +75,17 @@ def _parts(obstacle: BaseGeometry, index: int) -> Iterator[BaseGeometry]:
             )
 
 
+def _lines(geometry: BaseGeometry) -> list[BaseGeometry]:
+    """The rings of a polygon, or a line itself."""
+    if isinstance(geometry, shapely.Polygon):
+        return [geometry.exterior, *geometry.interiors]
+    return [geometry]
+
+
 def _edges(geometry: BaseGeometry) -> Array:
     """Boundary edges (m, 4) of a polygon with its holes, or of a line."""
-    rings: list[Any] = [geometry]
-    if isinstance(geometry, shapely.Polygon):
-        rings = [geometry.exterior, *geometry.interiors]
-    coordinates = [shapely.get_coordinates(ring) for ring in rings]
-    return np.concatenate([np.hstack([ring[:-1], ring[1:]]) for ring in coordinates])
+    coordinates = [shapely.get_coordinates(line) for line in _lines(geometry)]
+    return np.concatenate([np.hstack([line[:-1], line[1:]]) for line in coordinates])
 
 
 def _lists(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
@@ -133,6 +151,11 @@ class FreeSpace:
         x0, y0 = self.bounds.x1_min, self.bounds.x2_min
         return kernels.Grid(x0, y0, self.bounds.width / side, self.bounds.height / side, side, side)
 
+    @property
+    def has_obstacles(self) -> bool:
+        """Is there anything to avoid within the bounds?"""
+        return bool(self.geometries or self.circles or self.masks)
+
     def blocker(self, point: tuple[float, float]) -> str | None:
         """What makes a point not free, in words; None where it is free."""
         if not self.bounds.contains(np.array(point)):
@@ -161,6 +184,81 @@ class FreeSpace:
         free = np.empty(len(start), np.uint8)
         kernels.fill_free(self.data, start, end, free)
         return free.astype(bool)
+
+    def covered_cells(self, lattice: Lattice) -> npt.NDArray[np.bool_]:
+        """Cells (ny - 1, nx - 1) of a lattice that lie wholly inside one obstacle. In doubt, no."""
+        covered = np.zeros((lattice.ny - 1, lattice.nx - 1), bool)
+        for mask in self.masks:
+            covered |= _covered_by_mask(mask, lattice)
+        patches = [_covered_by_geometry(geometry, lattice) for geometry in self.geometries]
+        patches += [_covered_by_disc(circle, lattice) for circle in self.circles]
+        for window, inside in patches:
+            covered[window] |= inside
+        return covered
+
+    def separates(self, a: tuple[float, float], b: tuple[float, float]) -> bool:
+        """Is it proven that no path in free space leads from a to b?
+
+        a, b : (x1, x2), map units, in free space. False where a path exists, and where none may
+        but floating point leaves a doubt: a gap or a touch within rounding.
+        Raises InputError where a or b is not free.
+        """
+        for name, point in (("a", as_point(a, "a")), ("b", as_point(b, "b"))):
+            if blocker := self.blocker(point):
+                raise InputError(f"{name}=({point[0]:.10g}, {point[1]:.10g}) is {blocker}")
+        outlines = [*self.geometries, *(circle.inscribed for circle in self.circles)]
+        walls = np.array([line for outline in outlines for line in _lines(outline)], np.object_)
+        return separated(self.bounds, self.data, self.masks, walls, a, b)
+
+
+def _covered_by_geometry(geometry: BaseGeometry, lattice: Lattice) -> _Patch:
+    """Cells around a polygon that it covers."""
+    if not isinstance(geometry, shapely.Polygon):
+        return np.s_[0:0, 0:0], np.zeros((0, 0), bool)
+    window, low, high = _cells_near(lattice, geometry.bounds)
+    boxes = shapely.box(low[..., 0], low[..., 1], high[..., 0], high[..., 1])
+    return window, np.asarray(shapely.covers(geometry, boxes), bool).reshape(low.shape[:2])
+
+
+def _covered_by_disc(circle: Circle, lattice: Lattice) -> _Patch:
+    """Cells around a disc whose four corners lie in it."""
+    x, y, r = circle.x1, circle.x2, circle.radius
+    window, low, high = _cells_near(lattice, (x - r, y - r, x + r, y + r))
+    reach = np.maximum(np.abs(low - (x, y)), np.abs(high - (x, y)))
+    return window, np.asarray(np.hypot(reach[..., 0], reach[..., 1]) <= r * (1.0 - 1e-12))
+
+
+def _covered_by_mask(mask: Mask, lattice: Lattice) -> npt.NDArray[np.bool_]:
+    """Cells all of whose ground is blocked by the mask."""
+    dx, dy = mask.spacing
+    columns = _mask_spans(lattice.x, mask.x[0] - 0.5 * dx, dx, len(mask.x))
+    rows = _mask_spans(lattice.y, mask.y[0] - 0.5 * dy, dy, len(mask.y))
+    sums = np.zeros((len(mask.y) + 1, len(mask.x) + 1), np.int64)
+    sums[1:, 1:] = mask.blocked.cumsum(0).cumsum(1)
+    (j0, j1, in_rows), (i0, i1, in_columns) = rows, columns
+    j0, j1, in_rows = j0[:, None], j1[:, None], in_rows[:, None]
+    blocked = sums[j1, i1] - sums[j0, i1] - sums[j1, i0] + sums[j0, i0]
+    return np.asarray((blocked == (j1 - j0) * (i1 - i0)) & in_rows & in_columns)
+
+
+def _mask_spans(nodes: Array, origin: float, step: float, count: int) -> tuple[Any, Any, Any]:
+    """First and one past the last mask cell that each cell of an axis touches; is it within?"""
+    first = np.floor((nodes[:-1] - origin) / step - 1e-9).astype(np.int64)
+    last = np.ceil((nodes[1:] - origin) / step + 1e-9).astype(np.int64)
+    return np.clip(first, 0, count), np.clip(last, 0, count), (first >= 0) & (last <= count)
+
+
+def _cells_near(
+    lattice: Lattice, bounds: tuple[float, float, float, float]
+) -> tuple[Any, Array, Array]:
+    """The window of cells that meet a rectangle, and their lower and upper corners."""
+    columns = np.searchsorted(lattice.x, (bounds[0], bounds[2]))
+    rows = np.searchsorted(lattice.y, (bounds[1], bounds[3]))
+    i = np.arange(max(columns[0] - 1, 0), min(columns[1], lattice.nx - 1))
+    j = np.arange(max(rows[0] - 1, 0), min(rows[1], lattice.ny - 1))
+    low = np.stack(np.meshgrid(lattice.x[i], lattice.y[j]), axis=-1)
+    high = np.stack(np.meshgrid(lattice.x[i + 1], lattice.y[j + 1]), axis=-1)
+    return np.ix_(j, i), low, high
 
 
 def _stack_masks(masks: Sequence[Mask]) -> tuple[Array, Any, Any]:

@@ -12,8 +12,16 @@ from ._kernels.free_space import Grid
 from .errors import InputError
 from .validation import Array, Bounds, require_positive
 
+# The default spacing of the nodes is this share of the region's longer side.
+NODES_PER_SIDE = 250.0
+
 # Nodes that can be numbered by 32 bits, and fit in the memory of a large machine.
 MOST_NODES = 2**30
+
+
+def default_spacing(bounds: Bounds) -> float:
+    """A spacing of nodes that suits a region, map units."""
+    return max(bounds.width, bounds.height) / NODES_PER_SIDE
 
 
 @dataclass(frozen=True)

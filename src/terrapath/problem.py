@@ -86,6 +86,11 @@ class Problem:
         """Length on the surface of the straight way from start to goal, obstacles or not."""
         return metric.curve_length(self.surface, [self.start, self.goal])
 
+    @cached_property
+    def is_unreachable(self) -> bool:
+        """Is it proven that no path leads from start to goal?"""
+        return self.free_space.separates(self.start, self.goal)
+
     def __repr__(self) -> str:
         name = f"{self.name}: " if self.name else ""
         return f"Problem({name}{self.start} to {self.goal} within {self.bounds}; {self.surface!r})"
@@ -191,7 +196,8 @@ class Solution:
     Lengths are in map units. ``length`` is the true length of the path whatever the
     planner optimised; ``cost`` is what the planner itself believed. ``path``, ``length``
     and ``cost`` are None where no path was found, and so is a bound not asked for.
-    ``alternatives`` are further paths that the planner found, shortest first.
+    ``alternatives`` are further paths that the planner found, shortest first. Where the path
+    was refined, ``unrefined`` is the planner's own. ``certificate`` proves the lower bound.
     """
 
     problem: Problem
@@ -205,6 +211,8 @@ class Solution:
     stopped_by: str = ""
     lower_bound: float | None = None
     alternatives: tuple[Path, ...] = ()
+    unrefined: Path | None = None
+    certificate: Any = None
     history: History | None = None
     tree: SearchTree | None = None
     counters: dict[str, int] = field(default_factory=dict)

@@ -192,7 +192,7 @@ def obtuse_superbase(d, b):
     for _ in range(MOST_FLIPS):
         x2, y2 = -x0 - x1, -y0 - y1
         if dot(d, x0, y0, x1, y1) > 0.0:
-            x0, y0 = -x0, -y0
+            x0, y0, x1, y1 = x1, y1, -x0, -y0
         elif dot(d, x1, y1, x2, y2) > 0.0:
             x0, y0, x1, y1 = -x1, -y1, x2, y2
         elif dot(d, x2, y2, x0, y0) > 0.0:
@@ -345,6 +345,33 @@ def cut_links(space, grid, nodes):
 
 
 @kernel
+def block_nodes(grid, blocked, nodes):
+    """Take away all links to blocked nodes, blocked (ny nx,) uint8."""
+    for n in range(nodes.shape[0]):
+        node = nodes[n]
+        links = node.links
+        for side in range(6):
+            if links >> side & 1:
+                vector = vector_of(node, side)
+                step = vector.y * grid.nx + vector.x
+                if blocked[n] or blocked[n + step]:
+                    links &= ~(1 << side | 1 << side + SECOND)
+                elif links >> side + SECOND & 1 and blocked[n + 2 * step]:
+                    links &= ~(1 << side + SECOND)
+        node.links = links
+
+
+@kernel
+def shrink_metric(nodes, factors):
+    """Multiply all lengths at each node by a factor (n,)."""
+    for n in range(nodes.shape[0]):
+        scale = 1.0 / (factors[n] * factors[n])
+        nodes[n].rho0 *= scale
+        nodes[n].rho1 *= scale
+        nodes[n].rho2 *= scale
+
+
+@kernel
 def count_readers(nodes, nx, first):
     """Count into first[m + 1] the nodes that have m in their stencils."""
     for n in range(nodes.shape[0]):
@@ -413,7 +440,9 @@ def first_order(u, node, nx, n):
         a0 = nearest(u, node.links, n, s.s0, 0)
         a1 = nearest(u, node.links, n, s.s1, 2)
         a2 = nearest(u, node.links, n, s.s2, 4)
-    return solve_upwind(a0, a1, a2, np.float64(node.rho0), np.float64(node.rho1), np.float64(node.rho2))
+    return solve_upwind(
+        a0, a1, a2, np.float64(node.rho0), np.float64(node.rho1), np.float64(node.rho2)
+    )
 
 
 # Second-order differences are used where the second difference is at most this share of the

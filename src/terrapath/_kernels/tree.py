@@ -92,19 +92,25 @@ def chord_between(tree, a, b):
     return math.sqrt(total)
 
 
-@kernel
-def place(surface, tree, new, x, y):
-    """Write a vertex's position and what is cached with it; it is not yet in the tree."""
-    vertex = tree.vertices[new]
+@inner_kernel
+def survey(surface, graph, new, x, y):
+    """Write a vertex's position and the surface above it; any graph's with ``lifted`` layers."""
+    vertex = graph.vertices[new]
     vertex.x = x
     vertex.y = y
-    for layer in range(tree.lifted.shape[1]):
-        tree.lifted[new, layer] = surface.weights[layer] * value_at(surface, layer, x, y)
+    for layer in range(graph.lifted.shape[1]):
+        graph.lifted[new, layer] = surface.weights[layer] * value_at(surface, layer, x, y)
     h = metric_at(surface, x, y)
     vertex.h11 = h.h11
     vertex.h12 = h.h12
     vertex.h22 = h.h22
-    vertex.child = -1
+
+
+@kernel
+def place(surface, tree, new, x, y):
+    """Write a vertex's position and what is cached with it; it is not yet in the tree."""
+    survey(surface, tree, new, x, y)
+    tree.vertices[new].child = -1
 
 
 @kernel

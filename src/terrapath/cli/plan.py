@@ -206,7 +206,9 @@ def plan_command(
     planner: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="rrt-star-r, rrt-star (chord baseline), rrt or geodesic-traversal."
+            metavar="NAME",
+            help="rrt-star-r, rrt-star (chord baseline), rrt, dijkstra, a-star or "
+            "geodesic-traversal.",
         ),
     ] = "rrt-star-r",
     samples: Annotated[
@@ -221,6 +223,20 @@ def plan_command(
     seed: Annotated[
         int | None,
         typer.Option(metavar="K", help="The same seed, the same route [default: 0]."),
+    ] = None,
+    spacing: Annotated[
+        float | None,
+        typer.Option(
+            metavar="D",
+            help="Of the nodes of dijkstra and a-star, map units "
+            "[default: a 250th of the region's longer side].",
+        ),
+    ] = None,
+    neighbours: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", help="Of a node of dijkstra and a-star: 8, 16 or 32 [default: 16]."
+        ),
     ] = None,
     directions: Annotated[
         int | None,
@@ -288,6 +304,8 @@ def plan_command(
         "samples": samples,
         "step": step,
         "seed": seed,
+        "spacing": spacing,
+        "neighbours": neighbours,
         "directions": directions,
         "radius_factor": radius_factor,
         "goal_bias": goal_bias,

@@ -12,10 +12,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.linalg import LinAlgError
-from scipy.linalg import solveh_banded
 
 from .. import metric
+from ..refinement import shortest_polyline
 from ..surface import Surface
 from ..surface.fitting import Function
 from ..validation import Array
@@ -23,9 +22,6 @@ from ..validation import Array
 REGION = (-5.0, -5.0, 5.0, 5.0)
 SCALES = (0.4, 0.2, 0.1, 0.05)  # map units
 PIECES = (32, 64, 128, 256, 512)  # of the path; each number starts from the path of the one before
-STATIONARY = 1e-9  # largest derivative of the energy, as a share of it, at the path found
-MOST_STEPS = 200
-MOST_HALVINGS = 30
 
 Point = tuple[float, float]
 
@@ -152,80 +148,14 @@ def step(
     )
 
 
-# Shortest paths
-
-
-def _energy(surface: Surface, points: Array) -> float:
-    """Pieces times the sum of squared chords.
-
-    Least where the chords are equal and their sum, whose square it then is, is least.
-    """
-    steps = np.diff(surface.lift(points), axis=0)
-    return len(steps) * float(np.square(steps).sum())
-
-
-def _newton_step(surface: Surface, points: Array, curvature: float) -> tuple[Array, Array]:
-    """The energy's derivative by the inner points, and the step that makes it vanish.
-
-    points : (m + 2, 2). Returns (m, 2) twice. curvature : 1 for Newton's step, 0 to leave out
-    the second derivatives of the layers, which makes a step that always leads down.
-    Raises LinAlgError where the second derivative is not positive definite.
-    """
-    weights = surface.data.weights[:, None]
-    pull = -np.diff(surface.lift(points), n=2, axis=0)  # in R^n, on each inner point
-    slopes = surface.gradients(points[1:-1]) * weights
-    frames = np.concatenate([np.broadcast_to(np.eye(2), (len(pull), 2, 2)), slopes], axis=1)
-    bends = surface.hessians(points[1:-1]) * weights[..., None]
-    own = 2.0 * np.einsum("mka,mkb->mab", frames, frames)
-    own += curvature * np.einsum("mk,mkab->mab", pull[:, 2:], bends)
-    next_one = -np.einsum("mka,mkb->mab", frames[:-1], frames[1:])
-    derivative = np.einsum("mk,mka->ma", pull, frames)
-    bands = np.zeros((4, 2 * len(pull)))  # the upper triangle, as solveh_banded reads it
-    for row in range(2):
-        for column in range(2):
-            if row <= column:
-                bands[3 + row - column, column::2] = own[:, row, column]
-            bands[1 + row - column, 2 + column :: 2] = next_one[:, row, column]
-    step = -solveh_banded(bands, derivative.ravel())
-    return 2.0 * (len(pull) + 1) * derivative, step.reshape(-1, 2)
-
-
-def _settle(surface: Surface, points: Array) -> Array:
-    """The path of least energy with as many points, near the given one, by Newton's method."""
-    energy = _energy(surface, points)
-    for _ in range(MOST_STEPS):
-        try:
-            derivative, step = _newton_step(surface, points, 1.0)
-        except LinAlgError:
-            derivative, step = _newton_step(surface, points, 0.0)
-        if np.abs(derivative).max() <= STATIONARY * energy:
-            break
-        for halvings in range(MOST_HALVINGS):
-            tried = points.copy()
-            tried[1:-1] += 0.5**halvings * step
-            if (lower := _energy(surface, tried)) < energy:
-                break
-        else:
-            break  # as low as rounding lets it be
-        points, energy = tried, lower
-    return points
-
-
-def shortest_path(surface: Surface, points: Array) -> Array:
-    """The locally shortest polyline near the one given by PIECES[0] + 1 points, (m, 2)."""
-    found = _settle(surface, points)
-    for pieces in PIECES[1:]:
-        shares = np.linspace(0.0, 1.0, pieces + 1)
-        before = np.linspace(0.0, 1.0, len(found))
-        finer = np.column_stack([np.interp(shares, before, axis) for axis in found.T])
-        found = _settle(surface, finer)
-    return found
+# Shortest paths on them, smoothed
 
 
 def smoothed_path(sharp: SharpSurface, scale: float) -> SmoothedPath:
     """Smooth, and find the shortest path near the sharp surface's geodesic."""
     surface = Surface.from_function(sharp.height, REGION, smoothing=scale)
-    path = shortest_path(surface, sharp.true_path(np.linspace(0.0, 1.0, PIECES[0] + 1)))
+    guess = sharp.true_path(np.linspace(0.0, 1.0, PIECES[0] + 1))
+    path = shortest_polyline(surface, guess, PIECES)
     smoothing = surface.fit.smoothing
     assert smoothing is not None
     return SmoothedPath(

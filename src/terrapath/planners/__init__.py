@@ -1,19 +1,27 @@
 """Floor 5: planners. One planner, one file; ``PLANNERS`` is the registry."""
 
 from .base import Planner, Progress
+from .fast_marching import FastMarching
 from .geodesic_traversal import Fan, GeodesicTraversal
-from .registry import PLANNERS, make_planner, plan
+from .grid_search import AStar, Dijkstra
+from .optimal import Optimal
+from .registry import PLANNERS, finish, make_planner, plan
 from .rrt import RRT
 from .rrt_star import RRTStar
 
 __all__ = [
     "PLANNERS",
     "RRT",
+    "AStar",
+    "Dijkstra",
     "Fan",
+    "FastMarching",
     "GeodesicTraversal",
+    "Optimal",
     "Planner",
     "Progress",
     "RRTStar",
+    "finish",
     "make_planner",
     "plan",
 ]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from ..problem import Problem, Solution
+from ..problem import Problem, Solution, Status
+
+# What a planner says that did not have to search.
+SEPARATED = "start and goal lie in different parts of the free space"
 
 
 class Progress(NamedTuple):
@@ -30,3 +34,42 @@ class Planner(Protocol):
 
     def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
         """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+
+
+def stay_put(problem: Problem, planner: str, seed: int | None = None) -> Solution:
+    """The answer where the start is the goal: a path of length 0."""
+    return Solution(
+        problem=problem,
+        planner=planner,
+        status=Status.SOLVED,
+        path=problem.path([problem.start, problem.goal]),
+        cost=0.0,
+        seconds=0.0,
+        seed=seed,
+        stopped_by="start is goal",
+    )
+
+
+def answer_without_search(
+    problem: Problem, planner: str, seed: int | None = None
+) -> Solution | None:
+    """The answer where the start is the goal, or where it is proven that no path exists.
+
+    None where a search is needed. Every planner asks this first; one that then ends without
+    a path has not found one, and no more is known.
+    """
+    if problem.start == problem.goal:
+        return stay_put(problem, planner, seed)
+    started = time.perf_counter()
+    if not problem.is_unreachable:
+        return None
+    return Solution(
+        problem=problem,
+        planner=planner,
+        status=Status.UNREACHABLE,
+        path=None,
+        cost=None,
+        seconds=time.perf_counter() - started,
+        seed=seed,
+        stopped_by=SEPARATED,
+    )

@@ -14,8 +14,7 @@ from ..errors import InputError
 from ..geodesics import TOLERANCE, Geodesic, Miss, Ray, closest_approach, hit, is_bracket, trace_ray
 from ..problem import Path, Problem, Solution, Status
 from ..validation import Array, as_point, require_count, require_positive
-from .base import Callback, Progress
-from .tree_search import stay_put
+from .base import Callback, Progress, answer_without_search
 
 # 0.5 in the paper's region of 12 x 12: rays that pass this share of its side from the goal.
 NEAR_SHARE = 1.0 / 24.0
@@ -170,8 +169,9 @@ class GeodesicTraversal:
 
     def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
         """The shortest geodesic of the fan, its path sampled; ``cost`` is its exact length."""
-        if problem.start == problem.goal:
-            return stay_put(problem, self.name)
+        answer = answer_without_search(problem, self.name)
+        if answer is not None:
+            return answer
         started = time.perf_counter()
         fan = self.fan(problem, callback=callback)
         paths = tuple(_path(problem, geodesic) for geodesic in fan.geodesics)

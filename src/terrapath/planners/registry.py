@@ -11,7 +11,11 @@ from typing import Any
 from ..errors import InputError
 from ..problem import Problem, Solution
 from .base import Callback, Planner
+from .fast_marching import FastMarching
+from .finishing import bounded, refined
 from .geodesic_traversal import GeodesicTraversal
+from .grid_search import AStar, Dijkstra
+from .optimal import Optimal
 from .rrt import RRT
 from .rrt_star import RRTStar
 
@@ -19,7 +23,11 @@ PLANNERS: dict[str, Callable[..., Planner]] = {
     "rrt-star-r": partial(RRTStar, metric="riemannian"),
     "rrt-star": partial(RRTStar, metric="chord"),
     "rrt": RRT,
+    "dijkstra": Dijkstra,
+    "a-star": AStar,
+    "fast-marching": FastMarching,
     "geodesic-traversal": GeodesicTraversal,
+    "optimal": Optimal,
 }
 
 
@@ -52,8 +60,34 @@ def plan(
     problem: Problem,
     planner: str = "rrt-star-r",
     *,
+    refine: bool = False,
+    bound: bool = False,
+    target_gap: float | None = None,
     callback: Callback | None = None,
     **options: Any,
 ) -> Solution:
-    """Solve a problem with any planner by its name; options as keywords."""
-    return make_planner(planner, **options).solve(problem, callback=callback)
+    """Solve a problem with any planner by its name; options as keywords.
+
+    refine : take the path to the locally shortest one. bound : prove a lower bound on every
+    path's length. target_gap : refine the bound until (length - bound) / bound is met, which
+    asks for a bound; ``optimal`` does all three by itself.
+    """
+    if planner == "optimal" and target_gap is not None:
+        options["target_gap"] = target_gap
+    solution = make_planner(planner, **options).solve(problem, callback=callback)
+    return finish(solution, refine=refine, bound=bound, target_gap=target_gap)
+
+
+def finish(
+    solution: Solution,
+    *,
+    refine: bool = False,
+    bound: bool = False,
+    target_gap: float | None = None,
+) -> Solution:
+    """Refine and bound a solution as asked; what ``optimal`` has done is not done again."""
+    if refine and solution.planner != "optimal":
+        solution = refined(solution)
+    if bound or target_gap is not None:
+        solution = bounded(solution, target_gap=target_gap)
+    return solution

@@ -13,7 +13,7 @@ from .._kernels import tree as trees
 from .._kernels.buckets import Buckets
 from ..problem import History, Path, Problem, SearchTree, Solution, Status
 from ..validation import Array
-from .base import Callback, Progress
+from .base import Callback, Progress, answer_without_search
 
 # Samples between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 512
@@ -189,24 +189,11 @@ def _counters(tree: trees.Tree) -> dict[str, int]:
     return {name: int(tree.counters[place]) for name, place in places.items()}
 
 
-def stay_put(problem: Problem, planner: str, seed: int | None = None) -> Solution:
-    """The answer where the start is the goal: a path of length 0."""
-    return Solution(
-        problem=problem,
-        planner=planner,
-        status=Status.SOLVED,
-        path=problem.path([problem.start, problem.goal]),
-        cost=0.0,
-        seconds=0.0,
-        seed=seed,
-        stopped_by="start is goal",
-    )
-
-
 def search_tree(problem: Problem, options: TreeOptions, callback: Callback | None) -> Solution:
     """Grow a tree from the start until the options or the callback say stop."""
-    if problem.start == problem.goal:
-        return stay_put(problem, options.planner, options.seed)
+    answer = answer_without_search(problem, options.planner, options.seed)
+    if answer is not None:
+        return answer
     tree = _allocate(options.samples, len(problem.surface.layers))
     settings = _kernel_options(problem, options)
     _prepare(problem, tree, settings)

@@ -1,0 +1,119 @@
+"""Distinct locally shortest routes: which side of which peak or obstacle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from scipy.ndimage import minimum_filter
+
+from .eikonal import DistanceField, Medium, march_from
+from .lattice import Lattice, default_spacing
+from .problem import Path, Problem
+from .refinement import refine
+from .validation import Array, require_count, require_positive
+
+# Nodes are candidates to lead a route through where their detour is least within this share
+# of the region's side.
+NEIGHBOURHOOD = 1.0 / 40.0
+
+# Routes more than so many times as long as the shortest are of no interest.
+LONGEST = 1.5
+
+# Candidates traced and refined for each route that is asked for.
+TRIES = 6
+
+# Routes are the same where they are nowhere farther apart than this share of the region's side,
+# or end up equally long and nowhere farther apart than a neighbourhood.
+SAME_PLACE = 1e-3
+SAME_LENGTH = 1e-7
+
+
+def alternatives(
+    problem: Problem, count: int = 5, *, spacing: float | None = None
+) -> tuple[Path, ...]:
+    """The distinct locally shortest routes from start to goal, each refined, shortest first.
+
+    count : at most so many. spacing : of the nodes that routes are searched on, map units; by
+    default a 250th of the region's longer side.
+    A route is led through a node off the routes found before, where the sum of the distances
+    from start and goal is least. Empty where no route was found on the nodes.
+    """
+    require_count(count=count)
+    if spacing is not None:
+        require_positive(spacing=spacing)
+    if problem.start == problem.goal:
+        return (problem.path([problem.start, problem.goal]),)
+    lattice = Lattice.spanning(problem.bounds, spacing or default_spacing(problem.bounds))
+    medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
+    fields = [
+        march_from(problem.surface, problem.free_space, end, medium)
+        for end in (problem.start, problem.goal)
+    ]
+    return routes_of_fields(problem, fields[0], fields[1], count)
+
+
+def routes_of_fields(
+    problem: Problem, from_start: DistanceField, from_goal: DistanceField, count: int
+) -> tuple[Path, ...]:
+    """As ``alternatives``, with both distance fields given, on one lattice."""
+    found: list[Path] = []
+    for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
+        route = refine(problem, candidate)
+        if not any(_is_same(problem, route, other) for other in found):
+            found.append(route)
+        if tries >= TRIES * count:
+            break
+    return tuple(sorted(found, key=lambda path: path.length)[:count])
+
+
+def _candidates(
+    problem: Problem, from_start: DistanceField, from_goal: DistanceField
+) -> Iterator[Path]:
+    """Routes through the nodes with the least detours, each off all that came before."""
+    direct = from_start.path_to(problem.goal)
+    if direct is None:
+        return
+    yield direct
+    lattice = from_start.lattice
+    radius = NEIGHBOURHOOD * problem.bounds.side
+    near = shapely.buffer(direct.line, radius)
+    for point in _via_points(from_start.values + from_goal.values, lattice, radius):
+        if shapely.intersects_xy(near, *point):
+            continue
+        path = _lead_through(problem, from_start, from_goal, point)
+        if path is not None:
+            near = shapely.union(near, shapely.buffer(path.line, radius))
+            yield path
+
+
+def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:
+    """Nodes (m, 2) where the detour is least in a neighbourhood, by rising detour."""
+    size = (2 * math.ceil(radius / lattice.dy) + 1, 2 * math.ceil(radius / lattice.dx) + 1)
+    least = minimum_filter(detours, size=size, mode="nearest")
+    longest = LONGEST * float(detours.min())
+    chosen = np.isfinite(detours) & (detours <= least) & (detours <= longest)
+    rows, columns = np.nonzero(chosen)
+    order = np.argsort(detours[chosen], kind="stable")
+    return np.column_stack([lattice.x[columns], lattice.y[rows]])[order]
+
+
+def _lead_through(
+    problem: Problem, from_start: DistanceField, from_goal: DistanceField, point: Array
+) -> Path | None:
+    """The shortest path that visits a point."""
+    first, second = from_start.path_to(point), from_goal.path_to(point)
+    if first is None or second is None:
+        return None
+    return problem.path(np.concatenate([first.points[:-1], second.points[::-1]]))
+
+
+def _is_same(problem: Problem, a: Path, b: Path) -> bool:
+    side = problem.bounds.side
+    apart = shapely.hausdorff_distance(a.line, b.line)
+    if apart <= SAME_PLACE * side:
+        return True
+    alike = abs(a.length - b.length) <= SAME_LENGTH * max(a.length, b.length)
+    return bool(alike and apart <= NEIGHBOURHOOD * side)

@@ -1,0 +1,246 @@
+"""Pulling a path taut among obstacles.
+
+A path is a polyline whose points are free, or slide along a wall, or are held by a corner
+that the path bends round. Newton's method says where the points should go. On the way there
+the path is stopped at the first corner that it meets, which then holds it, and points stop at
+the walls that they meet; so it never jumps over an obstacle. When all is still, corners and
+walls that pull at the path rather than push it are let go.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from .._kernels import refinement as kernels
+from ..surface import Surface
+from ..validation import Array
+from .newton import Lifted, descent_step, is_stationary, lift, lower
+from .walls import SLACK, Indices, Surroundings
+
+NONE = -1
+MOST_ROUNDS = 1500
+MOST_RELEASES = 4  # of one corner
+# Radians that a path turns by at a contact that pulls, before it is let go.
+LEAST_PULL = 1e-6
+# A point this near to a corner's place, as a share of the clearance, is at it.
+AT_CORNER = 0.05
+
+
+@dataclass(frozen=True)
+class Band:
+    """A polyline and what holds each of its points.
+
+    points : (m, 2), map units. bends : (m,), the corner a point is at, or NONE. sides : (m,),
+    1 where that obstacle lies to the left, -1 where to the right. walls : (m, 2), those a point
+    touches, or NONE.
+    """
+
+    points: Array
+    bends: Indices
+    sides: Indices
+    walls: Indices
+
+    @classmethod
+    def free(cls, points: Array) -> Band:
+        """A polyline that touches nothing."""
+        count = len(points)
+        nothing = np.full(count, NONE)
+        return cls(points, nothing, np.zeros(count, int), np.full((count, 2), NONE))
+
+    @property
+    def is_held(self) -> npt.NDArray[np.bool_]:
+        """(m,): may a point not move at all? So it is for both ends, and at corners."""
+        held = np.asarray(self.bends != NONE)
+        held[[0, -1]] = True
+        return held
+
+    def inserted(self, before: Indices, points: Array, bends: Indices, sides: Indices) -> Band:
+        """With further points, each in front of the point of that index."""
+        return Band(
+            np.insert(self.points, before, points, axis=0),
+            np.insert(self.bends, before, bends),
+            np.insert(self.sides, before, sides),
+            np.insert(self.walls, before, np.full((len(before), 2), NONE), axis=0),
+        )
+
+
+def subdivided(band: Band, longest: float) -> Band:
+    """With pieces of at most that length on the plane, map units."""
+    sizes = np.hypot(*np.diff(band.points, axis=0).T)
+    cuts = np.maximum(np.ceil(sizes / longest - 1e-9), 1).astype(int) - 1
+    at = np.repeat(np.arange(len(sizes)), cuts)
+    if len(at) == 0:
+        return band
+    within = np.concatenate([np.arange(1, n + 1) / (n + 1) for n in cuts if n])[:, None]
+    places = (1.0 - within) * band.points[at] + within * band.points[at + 1]
+    nothing = np.full(len(at), NONE)
+    finer = band.inserted(at + 1, places, nothing, np.zeros(len(at), int))
+    # A piece along one wall stays on it.
+    shared = band.walls[at, 0] == band.walls[at + 1, 0]
+    finer.walls[at + 1 + np.arange(len(at)), 0] = np.where(shared, band.walls[at, 0], NONE)
+    return finer
+
+
+def _left(points: Array) -> Array:
+    """Unit vectors to the left of the way at the inner points. (m, 2) -> (m - 2, 2)."""
+    steps = np.diff(points, axis=0)
+    steps = steps / np.maximum(np.hypot(*steps.T), 1e-300)[:, None]
+    way = steps[1:] + steps[:-1]
+    left = np.column_stack([-way[:, 1], way[:, 0]])
+    return np.asarray(left / np.maximum(np.hypot(*left.T), 1e-300)[:, None])
+
+
+def adopted(around: Surroundings, band: Band) -> Band:
+    """With the points held that lie at corners: on the side noted, or the one they turn to."""
+    if len(around.corners) == 0:
+        return band
+    reach = AT_CORNER * float(around.clearance.min())
+    distance, nearest = cKDTree(around.corners).query(band.points, distance_upper_bound=reach)
+    steps = np.diff(band.points, axis=0)
+    turn = np.zeros(len(band.points))
+    turn[1:-1] = np.sign(steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0])
+    sides = np.where(band.sides == 0, turn, band.sides).astype(int)
+    found = np.isfinite(distance) & (band.bends == NONE) & (sides != 0)
+    found[[0, -1]] = False
+    points = band.points.copy()
+    points[found] = around.corners[nearest[found]]
+    bends, sides = np.where(found, nearest, band.bends), np.where(found, sides, band.sides)
+    return replace(band, points=points, bends=bends, sides=sides)
+
+
+def projectors(around: Surroundings, band: Band) -> Array:
+    """(m - 2, 2, 2), onto the moves that each inner point may make."""
+    allowed = np.tile(np.eye(2), (len(band.points), 1, 1))
+    sliding = band.walls[:, 0] != NONE
+    normals = around.walls.normals[band.walls[sliding, 0]]
+    allowed[sliding] -= normals[:, :, None] * normals[:, None, :]
+    allowed[band.is_held | (band.walls[:, 1] != NONE)] = 0.0
+    return allowed[1:-1]
+
+
+# Moving
+
+
+def advanced(around: Surroundings, band: Band, target: Array) -> tuple[Band, Indices]:
+    """The band moved towards the target (m, 2), as far as obstacles let it.
+
+    Points stop at the walls that they meet. A stretch between two held points stops where it
+    first meets a corner, which then holds it: the points in front of which these corners were
+    put are returned, too.
+    """
+    moves = target - band.points
+    hits = _stop_at_walls(around, band.points, moves)
+    times, corners = np.empty(len(moves) - 1), np.empty(len(moves) - 1, np.int64)
+    kernels.fill_corners(around.walls, band.points, moves, band.bends, times, corners)
+    stretch = np.cumsum(band.is_held) - 1
+    ends = np.full(stretch[-1] + 1, np.inf)
+    np.minimum.at(ends, stretch[:-1], times)
+    points = band.points + np.minimum(ends, 1.0)[stretch][:, None] * moves
+    arrived = (hits != NONE) & (ends[stretch] > 1.0)
+    walls = band.walls.copy()
+    order = (walls[arrived, 0] != NONE).astype(int)
+    walls[np.flatnonzero(arrived), order] = hits[arrived]
+    moved = replace(band, points=points, walls=walls)
+    met = np.flatnonzero((times == ends[stretch[:-1]]) & (times <= 1.0))
+    at = met[np.unique(stretch[met], return_index=True)[1]]  # one a stretch
+    sides = _sides(points, moves, at, around.walls.corners[corners[at]])
+    return moved.inserted(at + 1, around.corners[corners[at]], corners[at], sides), at + 1
+
+
+def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices:
+    """The wall that each point meets, or NONE; the moves, written to, end there."""
+    times, hits = np.empty(len(moves)), np.empty(len(moves), np.int64)
+    kernels.fill_walls(around.walls, points, moves, times, hits)
+    met = hits != NONE
+    slack = SLACK * around.clearance[hits[met], None] * around.walls.normals[hits[met]]
+    moves[met] = times[met, None] * moves[met] + slack
+    return hits
+
+
+def _sides(points: Array, moves: Array, at: Indices, corners: Array) -> Indices:
+    """On which side of the moving pieces the corners that they meet lie: 1 for the left."""
+    ahead, offset = points[at + 1] - points[at], corners - points[at]
+    squared = np.maximum((ahead**2).sum(axis=1), 1e-300)
+    within = np.clip((offset * ahead).sum(axis=1) / squared, 0.0, 1.0)[:, None]
+    velocity = (1.0 - within) * moves[at] + within * moves[at + 1]
+    across = ahead[:, 0] * velocity[:, 1] - ahead[:, 1] * velocity[:, 0]
+    return np.where(across > 0.0, 1, -1)
+
+
+# Letting go
+
+
+def _forces(surface: Surface, path: Lifted) -> Array:
+    """Minus the derivative of the length by each inner point: (m - 2, 2), without unit."""
+    chords = np.diff(path.above, axis=0)
+    units = chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-300)[:, None]
+    pulls = np.diff(units, axis=0)
+    weights = surface.data.weights[:, None]
+    slopes = path.jets[1:-1, :, 1:3] * weights
+    return np.asarray(pulls[:, :2] + np.einsum("mk,mka->ma", pulls[:, 2:], slopes))
+
+
+def loosened(
+    surface: Surface, around: Surroundings, band: Band, releases: dict[int, int]
+) -> Band | None:
+    """Without the contacts that pull at the path; None where there is none of them.
+
+    releases : how often each corner was let go already; it is written to.
+    """
+    force = _forces(surface, lift(surface, band.points))
+    outwards = -band.sides[1:-1] * (force * _left(band.points)).sum(axis=1)
+    pulling = np.zeros(len(band.points), bool)
+    pulling[1:-1] = (band.bends[1:-1] != NONE) & (outwards > LEAST_PULL)
+    for k in np.flatnonzero(pulling).tolist():
+        corner = int(band.bends[k])
+        releases[corner] = releases.get(corner, 0) + 1
+        pulling[k] = releases[corner] <= MOST_RELEASES
+    walls = band.walls.copy()
+    for which in (1, 0):
+        touching = np.flatnonzero(band.walls[1:-1, which] != NONE)
+        normals = around.walls.normals[band.walls[1 + touching, which]]
+        off = (force[touching] * normals).sum(axis=1) > LEAST_PULL
+        walls[1 + touching[off], which] = NONE
+    only_second = (walls[:, 0] == NONE) & (walls[:, 1] != NONE)
+    walls[only_second] = walls[only_second][:, ::-1]
+    if not pulling.any() and (walls == band.walls).all():
+        return None
+    bends, sides = np.where(pulling, NONE, band.bends), np.where(pulling, 0, band.sides)
+    return replace(band, bends=bends, sides=sides, walls=walls)
+
+
+def _slid_off(around: Surroundings, band: Band) -> Band:
+    """Points that slid beyond the end of their wall are free again."""
+    touching = np.flatnonzero(band.walls[:, 0] != NONE)
+    edges = around.walls.edges[band.walls[touching, 0]]
+    along, offset = edges[:, 2:] - edges[:, :2], band.points[touching] - edges[:, :2]
+    within = (along * offset).sum(axis=1) / (along**2).sum(axis=1)
+    off = touching[(within < 0.0) | (within > 1.0)]
+    if len(off) == 0:
+        return band
+    walls = band.walls.copy()
+    walls[off] = NONE
+    return replace(band, walls=walls)
+
+
+def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
+    """The band pulled taut: no move of its points that obstacles leave them shortens it."""
+    releases: dict[int, int] = {}
+    for _ in range(MOST_ROUNDS):
+        path = lift(surface, band.points)
+        step = descent_step(surface, path, projectors(around, band))
+        still = is_stationary(step, path)
+        found = None if still else lower(surface, path, step.move)
+        if found is None:
+            looser = loosened(surface, around, band, releases)
+            if looser is None:
+                break
+            band = looser
+            continue
+        band, _ = advanced(around, band, found.points)
+        band = _slid_off(around, band)
+    return band

@@ -1,0 +1,103 @@
+"""From a polyline of least energy to the exact geodesic, and points along it.
+
+The vertices of the polyline of least energy are off the geodesic by the square of their
+spacing. A geodesic of constant speed is one whose acceleration in R^n is normal to the
+surface; differences of fourth order measure that acceleration to the fourth power of the
+spacing, and the matrix of the polyline's Newton step serves to correct it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from .._kernels.surfaces import fill_metric
+from ..surface import Surface
+from ..validation import Array
+from .newton import farthest_move, lift, newton_step
+
+Curve = Callable[..., Array]  # shares of the way (m,) -> points (m, 2); with n: n-th derivative
+
+FEWEST_PIECES = 7  # that the differences fit into
+MOST_CORRECTIONS = 12
+CORRECTED = 1e-10  # largest correction at which it ends, as a share of the path's length
+
+# Where the path is straight, points are still laid as densely as this share of the mean.
+LEAST_DENSITY = 0.1
+SAMPLES_PER_PIECE = 4
+MOST_POINTS = 8192
+
+_CENTRAL = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12.0
+_BESIDE_END = np.array([10.0, -15.0, -4.0, 14.0, -6.0, 1.0]) / 12.0
+
+
+def _pull(above: Array) -> Array:
+    """Minus the second difference at the inner points, of fourth order. (m, n) -> (m - 2, n)."""
+    pull = np.empty((len(above) - 2, above.shape[1]))
+    windows = (above[k : len(above) - 4 + k] for k in range(5))
+    pull[1:-1] = -sum(w * part for w, part in zip(_CENTRAL, windows, strict=True))
+    pull[0] = -_BESIDE_END @ above[:6]
+    pull[-1] = -_BESIDE_END @ above[:-7:-1]
+    return pull
+
+
+def correct(surface: Surface, points: Array) -> Array | None:
+    """Vertices (m, 2) of a geodesic near those of a polyline of least energy.
+
+    Their error falls with the fourth power of their spacing. None where the surface is too
+    rough between the vertices for that.
+    """
+    if len(points) <= FEWEST_PIECES:
+        return None
+    projectors = np.tile(np.eye(2), (len(points) - 2, 1, 1))
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    last = farthest_move(surface, points)
+    points = points.copy()
+    for _ in range(MOST_CORRECTIONS):
+        path = lift(surface, points)
+        step = newton_step(surface, path, _pull(path.above), projectors)
+        size = float(np.abs(step.move).max())
+        if not step.definite or not size < last:
+            return None
+        points[1:-1] += step.move
+        if size <= CORRECTED * length:
+            break
+        last = size
+    return points
+
+
+def curve_through(points: Array) -> Curve:
+    """The smooth curve through vertices (m, 2), as a function of the share of the way."""
+    pieces = len(points) - 1
+    shares = np.linspace(0.0, 1.0, pieces + 1)
+    curve: Curve = make_interp_spline(shares, points, k=5 if pieces > 5 else min(3, pieces))
+    return curve
+
+
+def laid_shares(surface: Surface, curve: Curve, pieces: int, tolerance: float) -> Array:
+    """Shares of the way at which the points of a polyline are to be laid, both ends included.
+
+    The polyline is longer than the geodesic by ``tolerance`` of its length: a piece of planar
+    length d, where the curve turns by c a unit of length, by det h / h(u, u)^(3/2) c^2 d^3 / 24,
+    u being its direction. pieces : of the curve, which are sampled to find out.
+    """
+    t = np.linspace(0.0, 1.0, SAMPLES_PER_PIECE * pieces + 1)
+    places, v, bend = curve(t), curve(t, 1), curve(t, 2)
+    h = np.empty((len(t), 2, 2))
+    fill_metric(surface.data, np.ascontiguousarray(places), h)
+    speed = np.sqrt(np.einsum("ma,mab,mb->m", v, h, v))
+    determinant = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] ** 2
+    turning = v[:, 0] * bend[:, 1] - v[:, 1] * bend[:, 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        density = np.cbrt(np.nan_to_num(determinant * turning**2 / (24.0 * speed**3)))
+    total, length = np.trapezoid(density, t), np.trapezoid(speed, t)
+    if not (total > 0.0 and length > 0.0):
+        return np.array([0.0, 1.0])
+    count = math.ceil(math.sqrt(total**3 / (tolerance * length)))
+    density = np.maximum(density, LEAST_DENSITY * total)
+    reached = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    count = min(math.ceil(count * reached[-1] * (t[1] / total)), MOST_POINTS)
+    return np.asarray(np.interp(np.linspace(0.0, reached[-1], count + 1), reached, t))
