@@ -30,6 +30,9 @@ TRIES = 6
 SAME_PLACE = 1e-3
 SAME_LENGTH = 1e-7
 
+# Places along a route that are compared with another one.
+LOOKS = 65
+
 
 def alternatives(
     problem: Problem, count: int = 5, *, spacing: float | None = None
@@ -79,14 +82,19 @@ def _candidates(
     yield direct
     lattice = from_start.lattice
     radius = NEIGHBOURHOOD * problem.bounds.side
-    near = shapely.buffer(direct.line, radius)
-    for point in _via_points(from_start.values + from_goal.values, lattice, radius):
-        if shapely.intersects_xy(near, *point):
-            continue
-        path = _lead_through(problem, from_start, from_goal, point)
+    points = _via_points(from_start.values + from_goal.values, lattice, radius)
+    points = _away_from(direct, points, radius)
+    while len(points):
+        path = _lead_through(problem, from_start, from_goal, points[0])
+        points = points[1:]
         if path is not None:
-            near = shapely.union(near, shapely.buffer(path.line, radius))
+            points = _away_from(path, points, radius)
             yield path
+
+
+def _away_from(path: Path, points: Array, radius: float) -> Array:
+    """The points (m, 2) that are farther than a radius from a path."""
+    return points[~shapely.dwithin(path.line, shapely.points(points), radius)]
 
 
 def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:
@@ -112,8 +120,20 @@ def _lead_through(
 
 def _is_same(problem: Problem, a: Path, b: Path) -> bool:
     side = problem.bounds.side
-    apart = shapely.hausdorff_distance(a.line, b.line)
-    if apart <= SAME_PLACE * side:
+    if _stay_together(a, b, SAME_PLACE * side):
         return True
     alike = abs(a.length - b.length) <= SAME_LENGTH * max(a.length, b.length)
-    return bool(alike and apart <= NEIGHBOURHOOD * side)
+    return alike and _stay_together(a, b, NEIGHBOURHOOD * side)
+
+
+def _stay_together(a: Path, b: Path, distance: float) -> bool:
+    """Is neither path farther than a distance from the other, as far as LOOKS places tell?"""
+    shares = np.linspace(0.0, 1.0, LOOKS)
+    return all(
+        bool(
+            shapely.dwithin(
+                other.line, shapely.line_interpolate_point(one.line, shares, True), distance
+            ).all()
+        )
+        for one, other in ((a, b), (b, a))
+    )
