@@ -94,7 +94,8 @@ def _candidates(
 
 def _away_from(path: Path, points: Array, radius: float) -> Array:
     """The points (m, 2) that are farther than a radius from a path."""
-    return points[~shapely.dwithin(path.line, shapely.points(points), radius)]
+    near = np.asarray(shapely.dwithin(path.line, shapely.points(points), radius))
+    return points[~near]
 
 
 def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:

@@ -1,4 +1,4 @@
-"""Newton's method for polylines of least energy: one block tridiagonal system a step.
+"""Newton's method for polylines of least energy, and what a moving polyline runs into.
 
 The energy of a polyline is its number of pieces times the sum of its squared chords in R^n.
 Least energy makes the chords equal and their sum, whose square the energy then is, least.
@@ -173,7 +173,8 @@ def newton_step(jets, weights, pull, projectors, curvature, pivots, links, deriv
     makes H positive definite always.
     """
     fill_derivative(jets, weights, pull, projectors, derivative)
-    step[:] = derivative
+    for i in range(step.shape[0]):
+        step[i, 0], step[i, 1] = derivative[i, 0], derivative[i, 1]
     rows = eliminate(jets, weights, pull, projectors, curvature, pivots, links, step)
     if rows < step.shape[0]:
         downward(pivots, links, step, rows)

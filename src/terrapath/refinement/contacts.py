@@ -10,6 +10,7 @@ walls that pull at the path rather than push it are let go.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,9 +24,13 @@ from .walls import SLACK, Indices, Surroundings
 
 NONE = -1
 MOST_ROUNDS = 1500
-MOST_RELEASES = 4  # of one corner
+MOST_RELEASES = 8  # of one corner
 # Radians that a path turns by at a contact that pulls, before it is let go.
 LEAST_PULL = 1e-6
+# A taut path turns by a right angle at most where it bends round a corner: this is the cosine
+# of more than that. Whatever turns by more goes there and back.
+TURNED_BACK = -0.1
+TINY = 1e-300
 # A point this near to a corner's place, as a share of the clearance, is at it.
 AT_CORNER = 0.05
 
@@ -34,22 +39,18 @@ AT_CORNER = 0.05
 class Band:
     """A polyline and what holds each of its points.
 
-    points : (m, 2), map units. bends : (m,), the corner a point is at, or NONE. sides : (m,),
-    1 where that obstacle lies to the left, -1 where to the right. walls : (m, 2), those a point
-    touches, or NONE.
+    points : (m, 2), map units. bends : (m,), the corner a point is at, or NONE.
+    walls : (m, 2), those a point touches, or NONE.
     """
 
     points: Array
     bends: Indices
-    sides: Indices
     walls: Indices
 
     @classmethod
     def free(cls, points: Array) -> Band:
         """A polyline that touches nothing."""
-        count = len(points)
-        nothing = np.full(count, NONE)
-        return cls(points, nothing, np.zeros(count, int), np.full((count, 2), NONE))
+        return cls(points, np.full(len(points), NONE), np.full((len(points), 2), NONE))
 
     @property
     def is_held(self) -> npt.NDArray[np.bool_]:
@@ -58,14 +59,17 @@ class Band:
         held[[0, -1]] = True
         return held
 
-    def inserted(self, before: Indices, points: Array, bends: Indices, sides: Indices) -> Band:
+    def inserted(self, before: Indices, points: Array, bends: Any) -> Band:
         """With further points, each in front of the point of that index."""
         return Band(
             np.insert(self.points, before, points, axis=0),
             np.insert(self.bends, before, bends),
-            np.insert(self.sides, before, sides),
             np.insert(self.walls, before, np.full((len(before), 2), NONE), axis=0),
         )
+
+    def chosen(self, which: Any) -> Band:
+        """Some of the points: a slice, indices or (m,) bool."""
+        return Band(self.points[which], self.bends[which], self.walls[which])
 
 
 def subdivided(band: Band, longest: float) -> Band:
@@ -77,39 +81,30 @@ def subdivided(band: Band, longest: float) -> Band:
         return band
     within = np.concatenate([np.arange(1, n + 1) / (n + 1) for n in cuts if n])[:, None]
     places = (1.0 - within) * band.points[at] + within * band.points[at + 1]
-    nothing = np.full(len(at), NONE)
-    finer = band.inserted(at + 1, places, nothing, np.zeros(len(at), int))
+    finer = band.inserted(at + 1, places, NONE)
     # A piece along one wall stays on it.
     shared = band.walls[at, 0] == band.walls[at + 1, 0]
     finer.walls[at + 1 + np.arange(len(at)), 0] = np.where(shared, band.walls[at, 0], NONE)
     return finer
 
 
-def _left(points: Array) -> Array:
-    """Unit vectors to the left of the way at the inner points. (m, 2) -> (m - 2, 2)."""
+def _directions(points: Array) -> Array:
+    """Unit vectors along the pieces. (m, 2) -> (m - 1, 2)."""
     steps = np.diff(points, axis=0)
-    steps = steps / np.maximum(np.hypot(*steps.T), 1e-300)[:, None]
-    way = steps[1:] + steps[:-1]
-    left = np.column_stack([-way[:, 1], way[:, 0]])
-    return np.asarray(left / np.maximum(np.hypot(*left.T), 1e-300)[:, None])
+    return np.asarray(steps / np.maximum(np.hypot(*steps.T), TINY)[:, None])
 
 
 def adopted(around: Surroundings, band: Band) -> Band:
-    """With the points held that lie at corners: on the side noted, or the one they turn to."""
+    """With the points held that lie at corners."""
     if len(around.corners) == 0:
         return band
     reach = AT_CORNER * float(around.clearance.min())
     distance, nearest = cKDTree(around.corners).query(band.points, distance_upper_bound=reach)
-    steps = np.diff(band.points, axis=0)
-    turn = np.zeros(len(band.points))
-    turn[1:-1] = np.sign(steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0])
-    sides = np.where(band.sides == 0, turn, band.sides).astype(int)
-    found = np.isfinite(distance) & (band.bends == NONE) & (sides != 0)
+    found = np.isfinite(distance) & (band.bends == NONE)
     found[[0, -1]] = False
     points = band.points.copy()
     points[found] = around.corners[nearest[found]]
-    bends, sides = np.where(found, nearest, band.bends), np.where(found, sides, band.sides)
-    return replace(band, points=points, bends=bends, sides=sides)
+    return replace(band, points=points, bends=np.where(found, nearest, band.bends))
 
 
 def projectors(around: Surroundings, band: Band) -> Array:
@@ -147,8 +142,7 @@ def advanced(around: Surroundings, band: Band, target: Array) -> tuple[Band, Ind
     moved = replace(band, points=points, walls=walls)
     met = np.flatnonzero((times == ends[stretch[:-1]]) & (times <= 1.0))
     at = met[np.unique(stretch[met], return_index=True)[1]]  # one a stretch
-    sides = _sides(points, moves, at, around.walls.corners[corners[at]])
-    return moved.inserted(at + 1, around.corners[corners[at]], corners[at], sides), at + 1
+    return moved.inserted(at + 1, around.corners[corners[at]], corners[at]), at + 1
 
 
 def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices:
@@ -161,27 +155,29 @@ def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices
     return hits
 
 
-def _sides(points: Array, moves: Array, at: Indices, corners: Array) -> Indices:
-    """On which side of the moving pieces the corners that they meet lie: 1 for the left."""
-    ahead, offset = points[at + 1] - points[at], corners - points[at]
-    squared = np.maximum((ahead**2).sum(axis=1), 1e-300)
-    within = np.clip((offset * ahead).sum(axis=1) / squared, 0.0, 1.0)[:, None]
-    velocity = (1.0 - within) * moves[at] + within * moves[at + 1]
-    across = ahead[:, 0] * velocity[:, 1] - ahead[:, 1] * velocity[:, 0]
-    return np.where(across > 0.0, 1, -1)
-
-
 # Letting go
 
 
 def _forces(surface: Surface, path: Lifted) -> Array:
     """Minus the derivative of the length by each inner point: (m - 2, 2), without unit."""
     chords = np.diff(path.above, axis=0)
-    units = chords / np.maximum(np.linalg.norm(chords, axis=1), 1e-300)[:, None]
+    units = chords / np.maximum(np.linalg.norm(chords, axis=1), TINY)[:, None]
     pulls = np.diff(units, axis=0)
     weights = surface.data.weights[:, None]
     slopes = path.jets[1:-1, :, 1:3] * weights
     return np.asarray(pulls[:, :2] + np.einsum("mk,mka->ma", pulls[:, 2:], slopes))
+
+
+def outwards(around: Surroundings, band: Band) -> Array:
+    """(m - 2, 2): at corners, unit vectors across the way that lead off the obstacle; else 0."""
+    along = _directions(band.points)
+    way = along[1:] + along[:-1]
+    left = np.column_stack([-way[:, 1], way[:, 0]]) / np.maximum(np.hypot(*way.T), TINY)[:, None]
+    off = np.zeros_like(left)
+    bent = band.bends[1:-1] != NONE
+    corners = band.bends[1:-1][bent]
+    off[bent] = around.corners[corners] - around.walls.corners[corners]
+    return np.asarray(np.sign((off * left).sum(axis=1))[:, None] * left)
 
 
 def loosened(
@@ -192,9 +188,11 @@ def loosened(
     releases : how often each corner was let go already; it is written to.
     """
     force = _forces(surface, lift(surface, band.points))
-    outwards = -band.sides[1:-1] * (force * _left(band.points)).sum(axis=1)
+    pull = (force * outwards(around, band)).sum(axis=1)
+    along = _directions(band.points)
+    turns_back = (along[1:] * along[:-1]).sum(axis=1) < TURNED_BACK
     pulling = np.zeros(len(band.points), bool)
-    pulling[1:-1] = (band.bends[1:-1] != NONE) & (outwards > LEAST_PULL)
+    pulling[1:-1] = (band.bends[1:-1] != NONE) & ((pull > LEAST_PULL) | turns_back)
     for k in np.flatnonzero(pulling).tolist():
         corner = int(band.bends[k])
         releases[corner] = releases.get(corner, 0) + 1
@@ -209,8 +207,19 @@ def loosened(
     walls[only_second] = walls[only_second][:, ::-1]
     if not pulling.any() and (walls == band.walls).all():
         return None
-    bends, sides = np.where(pulling, NONE, band.bends), np.where(pulling, 0, band.sides)
-    return replace(band, bends=bends, sides=sides, walls=walls)
+    return replace(band, bends=np.where(pulling, NONE, band.bends), walls=walls)
+
+
+def _without_loops(band: Band) -> Band:
+    """Without what leads from a corner back to the same one, held by nothing in between."""
+    held = np.flatnonzero(band.is_held)
+    again = (band.bends[held[1:]] == band.bends[held[:-1]]) & (band.bends[held[1:]] != NONE)
+    if not again.any():
+        return band
+    kept = np.ones(len(band.points), bool)
+    for first, last in zip(held[:-1][again], held[1:][again], strict=True):
+        kept[first + 1 : last + 1] = False
+    return band.chosen(kept)
 
 
 def _slid_off(around: Surroundings, band: Band) -> Band:
@@ -236,6 +245,10 @@ def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
         still = is_stationary(step, path)
         found = None if still else lower(surface, path, step.move)
         if found is None:
+            shorter = _without_loops(band)
+            if shorter is not band:
+                band = shorter
+                continue
             looser = loosened(surface, around, band, releases)
             if looser is None:
                 break

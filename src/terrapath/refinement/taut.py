@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from .._kernels import free_space as grids
 from ..free_space import Circle, FreeSpace
 from ..problem import Problem
 from ..surface import Surface
 from ..validation import Array
-from .contacts import NONE, Band, adopted, advanced, subdivided, tightened
+from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
 from .newton import settle
 from .smooth import correct, curve_through, laid_shares
 from .walls import Indices, Surroundings, surroundings
@@ -123,11 +124,19 @@ def _with_finer_discs(
     cut = np.repeat(np.arange(len(discs)), factors)
     within = np.arange(len(cut)) - np.repeat(np.cumsum(factors) - factors, factors)
     # A disc to the left is passed from corner to corner in their order.
-    within = np.where(band.sides[cut] > 0, within, factors[cut] - 1 - within)
+    within = np.where(_is_left(around, band)[cut], within, factors[cut] - 1 - within)
     place = factors[cut] * (band.bends[cut] - old_first[discs[cut]]) + new_first[discs[cut]]
     bends = np.where(discs[cut] != NONE, place + within, band.bends[cut])
-    wanted = Band(band.points[cut], bends, band.sides[cut], np.full((len(cut), 2), NONE))
+    wanted = replace(Band.free(band.points[cut]), bends=bends)
     return finer, _pulled_back(finer, wanted, np.where(discs[cut] != NONE, cut, NONE))
+
+
+def _is_left(around: Surroundings, band: Band) -> npt.NDArray[np.bool_]:
+    """(m,): do the obstacles that the path bends round lie to its left?"""
+    left = np.zeros(len(band.points), bool)
+    off, way = outwards(around, band), band.points[2:] - band.points[:-2]
+    left[1:-1] = way[:, 0] * off[:, 1] - way[:, 1] * off[:, 0] < 0.0
+    return left
 
 
 def _pulled_back(around: Surroundings, band: Band, groups: Indices) -> Band:
@@ -159,7 +168,7 @@ def _pruned(around: Surroundings, band: Band) -> Band:
     kept = np.ones(len(band.points), bool)
     for first, last in zip(held[:-1][same & beside], held[1:][same & beside], strict=True):
         kept[first + 1 : last] = False
-    return Band(band.points[kept], band.bends[kept], band.sides[kept], band.walls[kept])
+    return band.chosen(kept)
 
 
 # The exact geodesics between the contacts
@@ -183,19 +192,13 @@ def _stretches(surface: Surface, around: Surroundings, band: Band) -> Iterator[t
     begins = np.concatenate([[True], ~(is_straight[1:] & is_straight[:-1])])
     groups = np.append(first[begins], last[-1])
     for begin, end, straight in zip(groups[:-1], groups[1:], is_straight[begins], strict=True):
-        yield _part(band, int(begin), int(end)), not straight
-
-
-def _part(band: Band, first: int, last: int) -> Band:
-    """Some of the band's points."""
-    chosen = slice(first, last + 1)
-    return Band(band.points[chosen], band.bends[chosen], band.sides[chosen], band.walls[chosen])
+        yield band.chosen(slice(begin, end + 1)), not straight
 
 
 def _joined(parts: list[Band]) -> Band:
     """Parts that share their ends, as one band."""
-    kept = [parts[0], *(_part(part, 1, len(part.points) - 1) for part in parts[1:])]
-    names = ("points", "bends", "sides", "walls")
+    kept = [parts[0], *(part.chosen(slice(1, None)) for part in parts[1:])]
+    names = ("points", "bends", "walls")
     return Band(*(np.concatenate([getattr(part, name) for part in kept]) for name in names))
 
 
