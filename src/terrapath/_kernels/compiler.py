@@ -41,12 +41,19 @@ class _PackageCache(FunctionCache):
 _kernels: list[Any] = []
 
 
-def _compile(function: Kernel, inline: bool) -> Kernel:
+def _compile(function: Kernel, *, inline: bool = False, allocates: bool = False) -> Kernel:
     if config.DISABLE_JIT:
         return function
-    dispatcher = njit(nogil=True, error_model="numpy", forceinline=inline, no_cfunc_wrapper=True)(
-        function
-    )
+    # Without Numba's run-time counting of references, which a call with a surface and a tree
+    # spends more time on than on its work: the caller holds all arrays, and only a kernel that
+    # makes one of its own needs the counting. Numba refuses to compile one that does without.
+    dispatcher = njit(
+        nogil=True,
+        error_model="numpy",
+        forceinline=inline,
+        no_cfunc_wrapper=True,
+        _nrt=allocates,
+    )(function)
     dispatcher._cache = _PackageCache(function)
     _kernels.append(dispatcher)
     return dispatcher
@@ -58,7 +65,12 @@ def kernel(function: Kernel) -> Kernel:
     No ``fastmath`` and no contraction: the same inputs give the same bits everywhere
     the compiler runs, which determinism rests on.
     """
-    return _compile(function, inline=False)
+    return _compile(function)
+
+
+def allocating_kernel(function: Kernel) -> Kernel:
+    """A kernel that makes arrays of its own."""
+    return _compile(function, allocates=True)
 
 
 def inner_kernel(function: Kernel) -> Kernel:
@@ -108,7 +120,7 @@ def per_class(implementations: dict[type, Kernel]) -> Callable[[Kernel], Kernel]
         scope: dict[str, Any] = {"select": select, "implementations": implementations}
         exec(_DISPATCH.format(arguments=", ".join(names), surface=names[0]), scope)
         generic: Kernel = wraps(declaration)(scope["generic"])
-        overload(generic, jit_options={"forceinline": True})(scope["resolve"])
+        overload(generic, jit_options={"forceinline": True, "_nrt": False})(scope["resolve"])
         return generic
 
     return declare

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853
 
-from .compiler import inner_kernel, kernel
+from .compiler import allocating_kernel, inner_kernel, kernel
 from .lengths import norm
 from .surfaces import Metric, jet_at
 
@@ -292,7 +292,7 @@ def step_to_edge(surface, tableau, bounds, s, end, h, outside, slopes):
     return part, State(x, y, end.vx, end.vy, end.j, end.dj)
 
 
-@kernel
+@allocating_kernel
 def trace(surface, tableau, bounds, x, y, angle, length, longest_step, unit, tolerance, rows):
     """Follow the geodesic that leaves (x, y) at an angle over a length, or to the bounds.
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .compiler import inner_kernel, kernel
+from .compiler import allocating_kernel, inner_kernel, kernel
 from .surfaces import metric_at, value_at
 
 
@@ -120,7 +120,7 @@ _LEVELS = 40
 _SHORTEST = 0.5**_LEVELS
 
 
-@kernel
+@allocating_kernel
 def piece_length(surface, ax, ay, dx, dy, low, high, tolerance):
     """The integral of |v|_h over t in [low, high] by adaptive bisection.
 
