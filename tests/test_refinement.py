@@ -390,6 +390,14 @@ def test_through_a_mask_the_path_is_the_taut_string(seed):
     assert 0.0 <= excess < 1e-6 or excess > 1e-4
 
 
+def test_round_a_cell_as_large_as_a_third_of_the_region_the_string_is_taut():
+    blocked = np.zeros((3, 3), bool)
+    blocked[1, 1] = True
+    problem = tp.Problem(FLAT, START, GOAL, REGION, [tp.Mask(blocked, [1, 5, 9], [1, 5, 9])])
+    refined = tp.refine(problem, [START, (0.0, 10.0), GOAL])
+    assert refined.length == pytest.approx(2.0 * math.hypot(3.0, 7.0), rel=1e-6)
+
+
 # Hills and obstacles
 
 
