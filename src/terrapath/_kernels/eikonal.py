@@ -94,10 +94,19 @@ DAY = 1  # number of the current bucket, not reduced
 # The queue
 
 
+# Days are whole numbers of 64 bits; a value that is farther away waits for this one.
+LAST_DAY = 2.0**62
+
+
+@inner_kernel
+def day_of(front, value):
+    return int(min(value * front.days_per_unit, LAST_DAY))
+
+
 @inner_kernel
 def enqueue(nodes, front, n, value):
     # A second-order value can be a little above what follows from it: that is due at once.
-    day = max(int(value * front.days_per_unit), front.counters[DAY])
+    day = max(day_of(front, value), front.counters[DAY])
     bucket = day & (front.heads.shape[0] - 1)
     head = front.heads[bucket]
     front.trial[n] = value
@@ -129,7 +138,7 @@ def earliest_day(nodes, front):
         while n >= 0:
             lowest = min(lowest, front.trial[n])
             n = nodes[n].after
-    return max(int(lowest * front.days_per_unit), front.counters[DAY])
+    return max(day_of(front, lowest), front.counters[DAY])
 
 
 @inner_kernel
@@ -139,7 +148,7 @@ def least_of_day(nodes, front, day):
     n = front.heads[day & (front.heads.shape[0] - 1)]
     while n >= 0:
         value = front.trial[n]
-        if value < lowest and int(value * front.days_per_unit) <= day:
+        if value < lowest and day_of(front, value) <= day:
             lowest, best = value, n
         n = nodes[n].after
     return best
