@@ -133,7 +133,9 @@ def _stay_together(a: Path, b: Path, distance: float) -> bool:
     return all(
         bool(
             shapely.dwithin(
-                other.line, shapely.line_interpolate_point(one.line, shares, True), distance
+                other.line,
+                shapely.line_interpolate_point(one.line, shares, normalized=True),
+                distance,
             ).all()
         )
         for one, other in ((a, b), (b, a))
