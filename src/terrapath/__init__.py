@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         TerrapathError,
     )
     from .free_space import Circle, FreeSpace
-    from .io import LayerSource, read_surface, write_route
+    from .io import LayerSource, read_surface, write_field, write_route
     from .lattice import Lattice
     from .metric import chord, curve_length, line_r
     from .planners import (
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         RRTStar,
         plan,
     )
-    from .plotting import plot_route
+    from .plotting import plot_field, plot_route
     from .problem import Path, Problem, Solution, Status
     from .refinement import refine
     from .surface import Layer, Mask, Surface
@@ -62,6 +62,7 @@ _HOMES = {
     "FreeSpace": "free_space",
     "LayerSource": "io",
     "read_surface": "io",
+    "write_field": "io",
     "write_route": "io",
     "Lattice": "lattice",
     "chord": "metric",
@@ -76,6 +77,7 @@ _HOMES = {
     "RRTStar": "planners",
     "Progress": "planners",
     "plan": "planners",
+    "plot_field": "plotting",
     "plot_route": "plotting",
     "Path": "problem",
     "Problem": "problem",
@@ -125,10 +127,12 @@ __all__ = [
     "lower_bound",
     "metric",
     "plan",
+    "plot_field",
     "plot_route",
     "read_surface",
     "refine",
     "scenes",
+    "write_field",
     "write_route",
 ]
 

@@ -39,6 +39,9 @@ TOLERATED = 0.9998
 # Half the side of the neighbourhood in which a repair shrinks lengths, in nodes.
 REACH = 2
 
+# The search never looks at less ground than this share of the bounds' longer side.
+SMALLEST_WINDOW = 1e-6
+
 # The core reaches so many cells from the start.
 CORE = 4
 
@@ -113,12 +116,14 @@ class Search:
             lambda points: near_distance(problem.surface, problem.start, points),
         )
         self.start_core, self.goal_core = _cores(problem, lattice)
+        self.fingerprint = fingerprint(problem)
         self.repairs = 0
         self._solve()
 
     def _solve(self) -> None:
         u = self.medium.march(self.model, limit=self.cap)
-        cap = min(self.cap, float(u[np.isfinite(u)].max()))
+        u[np.isnan(u)] = math.inf
+        cap = min(self.cap, float(u[np.isfinite(u)].max(initial=0.0)))
         self.proposal = Certificate(
             value=0.0,
             norm=math.inf,
@@ -127,7 +132,7 @@ class Search:
             horizon=min(_horizon(self.problem, self.lattice, u, self.goal_core), cap),
             start_core=self.start_core,
             goal_core=self.goal_core,
-            fingerprint=fingerprint(self.problem),
+            fingerprint=self.fingerprint,
         )
         self.needs = cell_needs(self.problem, self.proposal, TOLERATED)
 
@@ -156,16 +161,17 @@ def search_window(problem: Problem, length: float) -> Bounds:
         return bounds
     # An ellipse about both ends, its axes half as long as these.
     major = max(length, straight) * (1.0 + 1e-6)
-    minor = math.sqrt(major * major - straight * straight)
+    minor = math.sqrt(major - straight) * math.sqrt(major + straight)
     cosine, sine = (x1 - x0) / straight, (y1 - y0) / straight
-    east = 0.5 * math.hypot(major * cosine, minor * sine)
-    north = 0.5 * math.hypot(major * sine, minor * cosine)
+    least = SMALLEST_WINDOW * max(bounds.width, bounds.height)
+    east = max(0.5 * math.hypot(major * cosine, minor * sine), least)
+    north = max(0.5 * math.hypot(major * sine, minor * cosine), least)
     middle_x, middle_y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
     return Bounds(
-        max(middle_x - east, bounds.x1_min),
-        max(middle_y - north, bounds.x2_min),
-        min(middle_x + east, bounds.x1_max),
-        min(middle_y + north, bounds.x2_max),
+        max(min(middle_x - east, x0, x1), bounds.x1_min),
+        max(min(middle_y - north, y0, y1), bounds.x2_min),
+        min(max(middle_x + east, x0, x1), bounds.x1_max),
+        min(max(middle_y + north, y0, y1), bounds.x2_max),
     )
 
 
@@ -207,21 +213,37 @@ def lower_bound(
     shorter path can visit. target_gap : (length - bound) / bound at which to stop; by default
     the search stops after the first, coarsest lattice. time_limit : seconds, looked at between
     lattices. watch : called with each certificate; returning True stops the search.
+    Where no path is known, or none exists, the search stops after the first lattice, too.
     Returns the best certificate found, which compares with numbers as its value.
     """
     _check(length, target_gap, time_limit)
-    started = time.perf_counter()
-    if length is None:
-        length = known_length(problem)
+    deadline = time.perf_counter() + (math.inf if time_limit is None else time_limit)
+    # What is no number proves nothing, and so needs no warning.
+    with np.errstate(all="ignore"):
+        known = known_length(problem) if length is None else length
+        return _best(problem, known, target_gap, deadline, watch)
+
+
+def _best(
+    problem: Problem,
+    length: float,
+    target_gap: float | None,
+    deadline: float,
+    watch: Watch | None,
+) -> Certificate:
+    """The best certificate found when there is reason to stop."""
     best: Certificate | None = None
     for found in certificates(problem, length, target_gap=target_gap or 0.0):
         if best is None or found.value > best.value:
             best = found
-        if target_gap is None or length - best.value <= target_gap * best.value:
+        # Where no path is known, no bound comes close to its length.
+        if target_gap is None or math.isinf(length):
+            break
+        if length - best.value <= target_gap * best.value:
             break
         if watch is not None and watch(best):
             break
-        if time_limit is not None and time.perf_counter() - started > time_limit:
+        if time.perf_counter() > deadline:
             break
     assert best is not None
     return best

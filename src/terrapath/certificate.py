@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import numbers
 from dataclasses import dataclass, replace
 from functools import cached_property, total_ordering
 from pathlib import Path as FilePath
@@ -17,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import metric
 from ._kernels import certificate as kernels
+from ._kernels.surfaces import Spline, fill_values
 from .errors import CertificateError, MapError
 from .files import written_whole
 from .lattice import Lattice
@@ -28,8 +29,14 @@ from .validation import Array, Bounds, as_array, as_bounds
 # Far above the rounding of the checker's own arithmetic, far below any gap.
 ROUNDING = 1e-9
 
+# Far above the rounding of a layer's value, in units of the last place of its largest.
+EPSILONS = 64.0
+
 # A norm is not proven any closer than this to what samples of it suggest.
 CLOSE = 3e-5
+
+# Nor below this, so that nothing overflows: a function that is steep nowhere proves nothing.
+FLATTEST = 1e-3
 
 Cells = npt.NDArray[np.bool_]
 
@@ -53,7 +60,8 @@ class Certificate:
     is W / M. coefficients : (ny + 2, nx + 2), of the bicubic B-spline u on the cells of a
     lattice over ``bounds``. start_core, goal_core : the cells around the ends, where the chord
     takes the place of u. Outside ``bounds`` every path is long enough on the plane already.
-    fingerprint : of the problem that it speaks of.
+    fingerprint : of the problem that it speaks of. seal : a hash of all the others, so that
+    what was altered by mistake is told from what is wrong.
     A certificate compares with numbers as its value.
     """
 
@@ -65,17 +73,21 @@ class Certificate:
     start_core: Core
     goal_core: Core
     fingerprint: str
+    seal: str = ""
 
     def __float__(self) -> float:
         return self.value
 
     def __eq__(self, other: object) -> bool:
-        return self is other or (isinstance(other, int | float) and self.value == other)
+        if not isinstance(other, numbers.Real | Certificate):
+            return NotImplemented
+        return self.value == float(other)
 
     def __lt__(self, other: Any) -> bool:
         return self.value < float(other)
 
-    __hash__ = object.__hash__
+    def __hash__(self) -> int:
+        return hash(self.value)
 
     @cached_property
     def lattice(self) -> Lattice:
@@ -93,8 +105,12 @@ class Certificate:
                 f"the certificate speaks of problem {self.fingerprint[:12]}, this is "
                 f"{fingerprint(problem)[:12]}: surface, weights, obstacles, start or goal differ"
             )
-        if not (math.isfinite(self.value) and math.isfinite(self.norm) and self.norm > 0.0):
-            raise CertificateError(f"value={self.value} and norm={self.norm} must be finite")
+        _require_sound(self)
+        if self.seal != seal_of(self):
+            raise CertificateError(
+                f"the certificate was altered after it was made: its seal is {self.seal[:12]!r}, "
+                f"what it holds makes {seal_of(self)[:12]!r}"
+            )
         found = cell_needs(problem, self, self.norm)
         norm = proven_norm(problem, self, found.proven, self.norm)
         if not norm <= self.norm * (1.0 + 1e-3 * ROUNDING):
@@ -123,6 +139,7 @@ class Certificate:
                 start_core=np.array(self.start_core),
                 goal_core=np.array(self.goal_core),
                 fingerprint=self.fingerprint,
+                seal=self.seal,
             )
 
     @classmethod
@@ -139,35 +156,85 @@ class Certificate:
                     start_core=Core(*(int(k) for k in file["start_core"])),
                     goal_core=Core(*(int(k) for k in file["goal_core"])),
                     fingerprint=str(file["fingerprint"]),
+                    seal=str(file["seal"]),
                 )
-        except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
-            raise MapError(f"{path} is not a certificate: {error}") from None
+        except Exception as error:  # of a foreign file, zip, zlib and NumPy raise whatever they do
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise MapError(f"{path} is not a certificate: {reason:.200}") from None
 
 
 def fingerprint(problem: Problem) -> str:
     """A hash of everything that a bound depends on."""
+    data = problem.surface.data
+    ends = (problem.bounds, problem.start, problem.goal)
+    return _hash(type(data).__name__, *data, *ends, *problem.free_space.data)
+
+
+def seal_of(certificate: Certificate) -> str:
+    """A hash of all that a certificate holds, but its seal."""
+    return _hash(
+        certificate.fingerprint,
+        certificate.value,
+        certificate.norm,
+        certificate.horizon,
+        certificate.bounds,
+        certificate.start_core,
+        certificate.goal_core,
+        certificate.coefficients,
+    )
+
+
+def _hash(*parts: Any) -> str:
+    """SHA-256 of texts and arrays of numbers, their shapes included."""
     digest = hashlib.sha256()
-    for array in (
-        *problem.surface.data,
-        problem.bounds,
-        problem.start,
-        problem.goal,
-        *problem.free_space.data,
-    ):
-        digest.update(np.ascontiguousarray(array, dtype=np.float64).tobytes())
-        digest.update(b";")
+    for part in parts:
+        if isinstance(part, str):
+            digest.update(f"{len(part)};{part}".encode())
+        else:
+            digest.update(f"{np.shape(part)};".encode())
+            digest.update(np.ascontiguousarray(part, dtype=np.float64))
     return digest.hexdigest()
 
 
-def _bound(certificate: Certificate) -> kernels.Bound:
-    lattice = certificate.lattice
-    return kernels.Bound(
-        certificate.coefficients,
-        lattice.bounds.x1_min,
-        lattice.bounds.x2_min,
-        lattice.dx,
-        lattice.dy,
-    )
+class Ground(NamedTuple):
+    """The surface and the ends as kernels read them, the start being the origin of the plane.
+
+    So no digits are lost far from the map's own origin, nor between ends that lie close.
+    """
+
+    surface: Any
+    start: Array  # lifted, (2 + layers,)
+    goal: Array
+
+
+def _ground(problem: Problem) -> Ground:
+    (x, y), data = problem.start, problem.surface.data
+    moved: Any
+    if isinstance(data, Spline):
+        moved = data._replace(x0=data.x0 - x, y0=data.y0 - y)
+    else:
+        moved = data._replace(peaks=data.peaks - (0.0, 0.0, x, y))
+    ends = np.array([problem.start, problem.goal]) - (x, y)
+    values = np.empty((2, len(data.weights)))
+    fill_values(moved, ends, values)
+    return Ground(moved, *np.concatenate([ends, values * data.weights], axis=1))
+
+
+def _doubt(surface: Any) -> float:
+    """What rounding may add to a chord of a surface, for its layers' values, map units."""
+    if isinstance(surface, Spline):
+        sizes = np.abs(surface.coefficients).max(axis=(1, 2))
+    else:
+        sizes = np.add.reduceat(np.append(np.abs(surface.peaks[:, 0]), 0.0), surface.first[:-1])
+        sizes[np.diff(surface.first) == 0] = 0.0
+    return EPSILONS * float(np.finfo(np.float64).eps) * math.hypot(*(sizes * surface.weights))
+
+
+def _bound(problem: Problem, certificate: Certificate) -> kernels.Bound:
+    """The function u, the start being the origin."""
+    (x, y), lattice = problem.start, certificate.lattice
+    corner_x, corner_y = lattice.bounds.x1_min - x, lattice.bounds.x2_min - y
+    return kernels.Bound(certificate.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
 
 
 def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
@@ -206,12 +273,12 @@ def cell_needs(problem: Problem, certificate: Certificate, enough: float) -> Nee
     any closer.
     """
     _require_fit(problem, certificate)
-    lattice = certificate.lattice
+    lattice, ground = certificate.lattice, _ground(problem)
     found, likely, slope = np.empty((3, lattice.ny - 1, lattice.nx - 1))
     kernels.fill_needs(
-        problem.surface.data,
-        _bound(certificate),
-        problem.surface.lift(np.asarray(problem.goal)),
+        ground.surface,
+        _bound(problem, certificate),
+        ground.goal,
         float(certificate.horizon),
         exempt_cells(problem, certificate),
         float(enough) / (1.0 + ROUNDING),
@@ -230,10 +297,11 @@ def proven_norm(
 
     found : what they need, proven; the largest are looked at closely.
     """
+    ground = _ground(problem)
     norm = kernels.least_norm(
-        problem.surface.data,
-        _bound(certificate),
-        problem.surface.lift(np.asarray(problem.goal)),
+        ground.surface,
+        _bound(problem, certificate),
+        ground.goal,
         float(certificate.horizon),
         np.argsort(found, axis=None)[::-1],
         found,
@@ -241,6 +309,23 @@ def proven_norm(
         _cutting(problem, certificate.lattice),
     )
     return float(norm) * (1.0 + ROUNDING)
+
+
+def _require_sound(certificate: Certificate) -> None:
+    """Raise CertificateError where a number is none, or the coefficients are no spline's."""
+    value, norm, horizon = certificate.value, certificate.norm, certificate.horizon
+    if not (all(map(math.isfinite, (value, norm, horizon))) and norm > 0.0):
+        raise CertificateError(
+            f"value={value}, norm={norm} and horizon={horizon} must be finite, the norm above 0"
+        )
+    shape, kind = certificate.coefficients.shape, certificate.coefficients.dtype
+    if not (len(shape) == 2 and min(shape) >= 4 and kind == np.float64):
+        raise CertificateError(
+            f"coefficients of type {kind} and shape {shape} make no spline; (ny + 2, nx + 2) "
+            "with 2 x 2 nodes at least is expected"
+        )
+    if not np.isfinite(certificate.coefficients).all():
+        raise CertificateError("the coefficients are not all finite")
 
 
 def _require_fit(problem: Problem, certificate: Certificate) -> None:
@@ -272,25 +357,23 @@ def _overlap(a: Core, b: Core) -> bool:
 
 
 def edge_margin(
-    problem: Problem,
-    certificate: Certificate,
-    core: Core,
-    anchor: tuple[float, float],
-    factor: float,
+    problem: Problem, certificate: Certificate, core: Core, anchor: Array, factor: float
 ) -> float:
-    """At most chord(anchor, p) + factor u(p) for all p on the edge of a core, map units."""
-    lattice = certificate.lattice
+    """At most chord(anchor, p) + factor u(p) for all p on the edge of a core, map units.
+
+    anchor (2 + layers,) : a lifted point, the start being the origin of the plane.
+    """
     return float(
         kernels.margin_of_core(
-            problem.surface.data,
-            _bound(certificate),
-            problem.surface.lift(np.asarray(anchor)),
+            _ground(problem).surface,
+            _bound(problem, certificate),
+            anchor,
             float(factor),
             core.column0,
             core.column1,
             core.row0,
             core.row1,
-            _cutting(problem, lattice),
+            _cutting(problem, certificate.lattice),
         )
     )
 
@@ -302,15 +385,18 @@ def proven_value(problem: Problem, certificate: Certificate, norm: float) -> flo
     that for the first time at q. It is at least chord(start, p) + (u(q) - u(p)) / M +
     chord(q, goal) long, or meets a cell from where it is at least (W - u(p)) / M to the goal.
     """
-    straight = float(np.ravel(metric.chord(problem.surface, problem.start, problem.goal))[0])
-    straight *= 1.0 - ROUNDING
+    surface, start, goal = _ground(problem)
+    doubt = _doubt(surface)
+    straight = max(math.dist(start, goal) * (1.0 - ROUNDING) - doubt, 0.0)
     if _overlap(certificate.start_core, certificate.goal_core):
         return straight
     detour = least_detour(problem, certificate.bounds) * (1.0 - ROUNDING)
-    first = edge_margin(problem, certificate, certificate.start_core, problem.start, -1.0 / norm)
-    last = edge_margin(problem, certificate, certificate.goal_core, problem.goal, 1.0 / norm)
+    first = edge_margin(problem, certificate, certificate.start_core, start, -1.0 / norm)
+    last = edge_margin(problem, certificate, certificate.goal_core, goal, 1.0 / norm)
     rest = min(last, certificate.horizon / norm)
-    return max(min(first + rest - ROUNDING * (abs(first) + abs(rest)), detour), straight)
+    within = first + rest - ROUNDING * (abs(first) + abs(rest)) - doubt
+    # No number, where something overflowed.
+    return max(min(within, detour), straight) if within > straight else straight
 
 
 def least_detour(problem: Problem, window: Bounds) -> float:
@@ -321,17 +407,25 @@ def least_detour(problem: Problem, window: Bounds) -> float:
     """
     (x0, y0), (x1, y1) = problem.start, problem.goal
     outer, found = problem.bounds, math.inf
+    # Differences first: far from the map's origin the sum of two places loses digits.
     for side, edge in ((window.x1_min, outer.x1_min), (window.x1_max, outer.x1_max)):
         if side != edge:
-            found = min(found, math.hypot(x0 + x1 - 2.0 * side, y1 - y0))
+            found = min(found, math.hypot((x0 - side) + (x1 - side), y1 - y0))
     for side, edge in ((window.x2_min, outer.x2_min), (window.x2_max, outer.x2_max)):
         if side != edge:
-            found = min(found, math.hypot(x1 - x0, y0 + y1 - 2.0 * side))
+            found = min(found, math.hypot(x1 - x0, (y0 - side) + (y1 - side)))
     return found
 
 
 def certify(problem: Problem, proposal: Certificate, found: Needs) -> Certificate:
-    """The proposal with the norm and the value that are proven; found : what its cells need."""
-    enough = max(float(found.likely.max()) * (1.0 + CLOSE), float(np.finfo(np.float64).tiny))
+    """The proposal with the norm and the value that are proven; found : what its cells need.
+
+    Where no norm can be proven, the straight line's length in R^n is the bound.
+    """
+    enough = max(float(found.likely.max()) * (1.0 + CLOSE), FLATTEST)
     norm = proven_norm(problem, proposal, found.proven, enough)
-    return replace(proposal, norm=norm, value=proven_value(problem, proposal, norm))
+    if not math.isfinite(norm):
+        nothing = np.zeros_like(proposal.coefficients)
+        proposal, norm = replace(proposal, coefficients=nothing, horizon=0.0), 1.0
+    made = replace(proposal, norm=norm, value=proven_value(problem, proposal, norm))
+    return replace(made, seal=seal_of(made))

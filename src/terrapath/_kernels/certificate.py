@@ -273,13 +273,15 @@ def spline_models(coefficients, i, j, t, s, w, v, dx, dy):
     (w, v), all as shares of the cell, which is dx by dy.
     """
     zero = constant(0.0)
-    total = Layer(zero, zero, zero)
+    # What all coefficients share adds to the value alone, and no digit of a slope cancels.
+    base = coefficients[j + 1, i + 1]
+    total = Layer(constant(base), zero, zero)
     for q in range(4):
         # Along a row first: the sum over the columns is a series in p.
         c0, c1, c2, c3 = 0.0, 0.0, 0.0, 0.0
         for k in range(4):
             series = bump(k, t, w)
-            c = coefficients[j + q, i + k]
+            c = coefficients[j + q, i + k] - base
             c0 += c * series.c0
             c1 += c * series.c1
             c2 += c * series.c2
@@ -509,7 +511,7 @@ def facts_of_box(surface, bound, goal, i, j, box, work):
     excess = minus(top, times_number(bottom, middle))
     least = max(bottom.c00 - spread(bottom), 1.0)
     return Facts(
-        middle + spread(excess) / least,
+        middle + (abs(excess.c00) + spread(excess)) / least,
         largest_ratio(top, bottom),
         u.value.c00 - spread(u.value),
         math.sqrt(chord),
@@ -531,12 +533,15 @@ def need_of_box(facts, horizon):
     Either the dual norm is at most M everywhere in it, or u / M and the chord to the goal
     add up to horizon / M anywhere in it, so that no path through it is shorter.
     """
-    slope = math.sqrt(max(facts.norm, 0.0))
-    likely = math.sqrt(max(facts.sample, 0.0))
-    short = max(horizon - facts.lowest, 0.0)
-    way_out = short / facts.chord if facts.chord > 0.0 else math.inf
-    if short == 0.0:
+    # Of what overflowed, and so may be no number, nothing is proven.
+    slope = math.sqrt(max(facts.norm, 0.0)) if facts.norm < math.inf else math.inf
+    likely = math.sqrt(max(facts.sample, 0.0)) if facts.sample < math.inf else math.inf
+    short = horizon - facts.lowest
+    way_out = math.inf
+    if short <= 0.0:
         way_out = 0.0
+    elif short < math.inf and facts.chord > 0.0:
+        way_out = short / facts.chord
     return Need(min(slope, way_out), min(likely, way_out), likely)
 
 
@@ -705,7 +710,9 @@ def margin_of_box(surface, bound, anchor, factor, i, j, box):
             value = layer_over(surface, k, box).value
             offset = minus(value, constant(value.c00))
             total = plus(total, times_number(offset, (value.c00 - anchor[2 + k]) / chord))
-    return total.c00 - spread(total)
+    margin = total.c00 - spread(total)
+    # No number, where something overflowed.
+    return margin if margin > -math.inf else -math.inf
 
 
 # A cell's side on the core's edge is cut into so many parts.

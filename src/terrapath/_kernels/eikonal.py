@@ -346,7 +346,7 @@ def cut_links(space, grid, nodes):
     """Take away the links of all nodes that cross or touch an obstacle."""
     for n in range(nodes.shape[0]):
         node = nodes[n]
-        links = node.links
+        links = np.int64(node.links)
         for side in range(6):
             if links >> side & 1:
                 links &= ~blocked_side(space, grid, n, vector_of(node, side), links, side)
@@ -358,7 +358,7 @@ def block_nodes(grid, blocked, nodes):
     """Take away all links to blocked nodes, blocked (ny nx,) uint8."""
     for n in range(nodes.shape[0]):
         node = nodes[n]
-        links = node.links
+        links = np.int64(node.links)
         for side in range(6):
             if links >> side & 1:
                 vector = vector_of(node, side)

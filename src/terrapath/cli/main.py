@@ -9,7 +9,10 @@ import typer
 
 from .. import __version__
 from ..errors import TerrapathError
+from .benchmark import benchmark_command
+from .check import check_command
 from .exit_codes import ExitCode
+from .field import field_command
 from .plan import plan_command
 from .reproduce import reproduce_command
 from .scenes import scenes_command
@@ -27,8 +30,11 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("plan")(plan_command)
+app.command("check")(check_command)
+app.command("field")(field_command)
 app.command("scenes")(scenes_command)
 app.command("reproduce")(reproduce_command)
+app.command("benchmark")(benchmark_command)
 
 
 def _show_version(wanted: bool) -> None:

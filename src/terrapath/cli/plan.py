@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import json
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from ..errors import InputError, MapError
+from ..errors import InputError
 from .exit_codes import ExitCode
+from .outputs import require_ending, require_outputs
+from .question import Goal, HeightBand, Layers, Question, Start, Weights, Where
 
 if TYPE_CHECKING:
-    from ..planners import Planner
+    from ..planners import Finished
     from ..problem import Problem, Solution
 
 
@@ -23,10 +29,10 @@ class Outputs:
 
     files: list[Path]
     plot: Path | None
+    certificate: Path | None
 
     def check(self) -> None:
         """Find out before the planning whether all can be written."""
-        from ..files import require_writable
         from ..io.routes import require_known_format
 
         for path in self.files:
@@ -35,182 +41,107 @@ class Outputs:
             from ..plotting.figure import require_known_picture
 
             require_known_picture(self.plot)
-        for path in self.all:
-            require_writable(path)
-        if len({path.absolute() for path in self.all}) < len(self.all):
-            raise MapError("the same file is named twice among the outputs; name each once")
-
-    @property
-    def all(self) -> list[Path]:
-        """Every file that will be written."""
-        return [*self.files, *([] if self.plot is None else [self.plot])]
+        if self.certificate is not None:
+            require_ending(self.certificate, "certificate", ".npz")
+        optional = (self.plot, self.certificate)
+        require_outputs([*self.files, *(path for path in optional if path is not None)])
 
     def write(self, solution: Solution) -> None:
-        """Write every file."""
+        """Write every file that there is something to write into."""
         from ..io import write_route
 
         for path in self.files:
             write_route(solution, path)
+        if self.certificate is not None:
+            if solution.certificate is None:
+                print("terrapath: no bound was proven to write a certificate of", file=sys.stderr)
+            else:
+                solution.certificate.save(self.certificate)
         if self.plot is not None:
             from ..plotting import plot_route
 
             plot_route(solution, self.plot)
 
 
-def _parse_point(text: str, name: str) -> tuple[float, float]:
-    """X,Y."""
-    try:
-        x, y = (float(part) for part in text.split(","))
-    except ValueError:
+def _require_agreement(
+    planner: str, refine: bool, bound: bool, target_gap: float | None, certificate: Path | None
+) -> None:
+    """Raise InputError for options that contradict each other."""
+    if planner == "optimal" and not (refine and bound):
         raise InputError(
-            f"{name}={text!r} is not a point; write it as X,Y, two numbers with a comma between"
-        ) from None
-    return x, y
-
-
-def _parse_pair(text: str, option: str, form: str) -> tuple[str, str]:
-    """NAME=VALUE."""
-    name, separator, value = text.partition("=")
-    if not (separator and name.strip() and value.strip()):
-        raise InputError(f"{option} {text!r} is not of the form {form}")
-    return name.strip(), value.strip()
-
-
-def _parse_weights(texts: list[str]) -> dict[str, float]:
-    weights = {}
-    for text in texts:
-        name, value = _parse_pair(text, "--weight", "NAME=WEIGHT")
-        try:
-            weights[name] = float(value)
-        except ValueError:
-            raise InputError(f"--weight {text!r}: {value!r} is not a number") from None
-    return weights
-
-
-@dataclass(frozen=True)
-class Question:
-    """What the command line asks to be planned."""
-
-    where: str
-    start: str | None
-    goal: str | None
-    height_band: int | None
-    layers: list[str]
-    weights: list[str]
-
-    def problem(self) -> Problem:
-        """The problem that is asked for."""
-        from ..scenes import SCENES
-
-        base = self._scene() if self.where in SCENES else None
-        surface = base.surface if base is not None else self._read_surface()
-        weights = _parse_weights(self.weights)
-        return self._build(surface.with_weights(weights) if weights else surface, base)
-
-    def _scene(self) -> Problem:
-        from ..scenes import load
-
-        if self.layers or self.height_band is not None:
-            raise InputError(
-                f"--layer and --height-band describe a raster, but {self.where!r} is a built-in "
-                "scene; leave them out, or name a file"
-            )
-        return load(self.where)
-
-    def _read_surface(self) -> Any:
-        from ..io import read_surface
-        from ..scenes import names
-
-        path = Path(self.where)
-        if not path.exists() and not path.suffix:
-            raise InputError(
-                f"{self.where!r} is neither a built-in scene ({', '.join(names())}) nor a file"
-            )
-        pairs = [_parse_pair(t, "--layer", "NAME=FILE[:BAND][*WEIGHT]") for t in self.layers]
-        layers = dict(pairs)
-        if len(layers) < len(pairs):
-            raise InputError("--layer gives a name twice; give each layer its own name")
-        band = 1 if self.height_band is None else self.height_band
-        return read_surface(path, height_band=band, layers=layers)
-
-    def _build(self, surface: Any, base: Problem | None) -> Problem:
-        from ..problem import Problem
-
-        ends = {}
-        for name, text in (("start", self.start), ("goal", self.goal)):
-            if text is not None:
-                ends[name] = _to_plane(surface, _parse_point(text, name), name)
-            elif base is not None:
-                ends[name] = base.start if name == "start" else base.goal
-            else:
-                raise InputError(
-                    f"{name} is missing; give --{name} X,Y in map units, within "
-                    f"{_describe_extent(surface)}"
-                )
-        bounds = None if base is None else base.bounds
-        title = base.name if base is not None else Path(self.where).stem
-        return Problem(surface, ends["start"], ends["goal"], bounds, name=title)
-
-
-def _to_plane(surface: Any, point: tuple[float, float], name: str) -> tuple[float, float]:
-    """A point in the map's own coordinates, on the plane that is planned in."""
-    import math
-
-    import numpy as np
-
-    reference = surface.georeference
-    if reference is None or reference.is_map_crs:
-        return point
-    x, y = reference.from_map(np.array(point))
-    inside = surface.bounds is None or surface.bounds.contains(np.array([x, y]))
-    if not (math.isfinite(x) and math.isfinite(y) and inside):
-        raise InputError(
-            f"{name}=({point[0]:.10g}, {point[1]:.10g}) is outside the map, "
-            f"{_describe_extent(surface)}; check the axis order: X is the longitude"
+            "planner optimal refines its routes and proves its bound by itself; leave out "
+            "--no-refine and --no-bound, or choose fast-marching"
         )
-    return float(x), float(y)
+    for option, value in (("--target-gap", target_gap), ("--certificate", certificate)):
+        if value is not None and not bound:
+            raise InputError(f"{option} asks for a bound and --no-bound for none; leave out one")
 
 
-def _describe_extent(surface: Any) -> str:
-    """The surface's extent in the map's own coordinates."""
-    import numpy as np
+@contextmanager
+def _remarks() -> Iterator[None]:
+    """What could not be finished goes to standard error, one line each."""
+    from ..planners import UnfinishedWarning
 
-    reference, bounds = surface.georeference, surface.bounds
-    if reference is None or reference.is_map_crs:
-        return str(bounds)
-    (west, south), (east, north) = reference.to_map(np.array([bounds[:2], bounds[2:]]))
-    return f"longitude {west:.5f} to {east:.5f}, latitude {south:.5f} to {north:.5f}"
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UnfinishedWarning)
+        show_others = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+            if issubclass(category, UnfinishedWarning):
+                print(f"terrapath: {message}", file=sys.stderr)
+            else:
+                show_others(message, category, *place)
+
+        warnings.showwarning = cast("Any", show)
+        yield
 
 
-def _solve(planner: Planner, problem: Problem, quiet: bool) -> Solution:
+def _solve(planner: Finished, problem: Problem, quiet: bool) -> Solution:
     """Plan, with a progress bar where somebody is watching."""
     from .progress import progress_bar
 
-    with progress_bar(problem, quiet) as callback:
+    with _remarks(), progress_bar(problem, quiet) as callback:
         return planner.solve(problem, callback=callback)
 
 
 def plan_command(
-    where: Annotated[
-        str,
-        typer.Argument(
-            metavar="WHERE", help="A built-in scene (see `terrapath scenes`) or a raster."
-        ),
-    ],
-    start: Annotated[
-        str | None, typer.Option(metavar="X,Y", help="Start, in the map's own coordinates.")
-    ] = None,
-    goal: Annotated[
-        str | None, typer.Option(metavar="X,Y", help="Goal, in the map's own coordinates.")
-    ] = None,
+    where: Where,
+    start: Start = None,
+    goal: Goal = None,
     planner: Annotated[
         str,
         typer.Option(
             metavar="NAME",
-            help="rrt-star-r, rrt-star (chord baseline), rrt, dijkstra, a-star or "
-            "geodesic-traversal.",
+            help="rrt-star-r, rrt-star (chord baseline), rrt, dijkstra, a-star, fast-marching, "
+            "geodesic-traversal or optimal.",
         ),
     ] = "rrt-star-r",
+    refine: Annotated[
+        bool,
+        typer.Option(
+            "--refine/--no-refine",
+            help="Take the planner's path to the locally shortest one [default], or not.",
+        ),
+    ] = True,
+    bound: Annotated[
+        bool,
+        typer.Option(
+            "--bound/--no-bound",
+            help="Prove how short any path can be [default], or not.",
+        ),
+    ] = True,
+    target_gap: Annotated[
+        float | None,
+        typer.Option(
+            metavar="G",
+            help="Refine the bound until (length - bound) / bound is G "
+            "[default: 0.001 with optimal, else the first bound will do].",
+        ),
+    ] = None,
+    routes: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Distinct routes that optimal looks for [default: 3]."),
+    ] = None,
     samples: Annotated[
         int | None, typer.Option(metavar="N", help="Samples to draw [default: 10000].")
     ] = None,
@@ -228,7 +159,7 @@ def plan_command(
         float | None,
         typer.Option(
             metavar="D",
-            help="Of the nodes of dijkstra and a-star, map units "
+            help="Of the nodes of dijkstra, a-star, fast-marching and optimal, map units "
             "[default: a 250th of the region's longer side].",
         ),
     ] = None,
@@ -264,21 +195,9 @@ def plan_command(
     target_length: Annotated[
         float | None, typer.Option(metavar="LENGTH", help="Stop at a path this short, map units.")
     ] = None,
-    height_band: Annotated[
-        int | None,
-        typer.Option(metavar="BAND", help="Band of the heights [default: 1]."),
-    ] = None,
-    layer: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=FILE[:BAND][*WEIGHT]", help="A further layer; may be repeated."),
-    ] = None,
-    weight: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=WEIGHT",
-            help="Map units that a unit of a layer counts for.",
-        ),
-    ] = None,
+    height_band: HeightBand = None,
+    layer: Layers = None,
+    weight: Weights = None,
     output: Annotated[
         list[Path] | None,
         typer.Option(metavar="FILE", help="Write .geojson, .csv or .json; may be repeated."),
@@ -286,19 +205,26 @@ def plan_command(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the route: .png, .svg, .pdf or .jpg.")
     ] = None,
+    certificate: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write the proof of the bound, .npz, for `terrapath check`."
+        ),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one JSON object and nothing else.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> int:
-    """Plan one route on a surface.
+    """Plan one route on a surface, and prove how far from the shortest it can be.
 
     Exit codes: 0 solved, 2 bad input, 3 no path found within the limits, 4 proven
     unreachable, 130 interrupted (the best route so far is written).
     """
-    from ..planners import make_planner
+    _require_agreement(planner, refine, bound, target_gap, certificate)
+    from ..planners import make_finished
 
-    outputs = Outputs(output or [], plot)
+    outputs = Outputs(output or [], plot, certificate)
     outputs.check()
     options = {
         "samples": samples,
@@ -307,6 +233,7 @@ def plan_command(
         "spacing": spacing,
         "neighbours": neighbours,
         "directions": directions,
+        "routes": routes,
         "radius_factor": radius_factor,
         "goal_bias": goal_bias,
         "informed": informed,
@@ -314,17 +241,19 @@ def plan_command(
         "target_length": target_length,
     }
     given = {name: value for name, value in options.items() if value is not None}
-    chosen = make_planner(planner, **given)
-    problem = Question(where, start, goal, height_band, layer or [], weight or []).problem()
-    solution = _solve(chosen, problem, quiet or as_json)
+    chosen = make_finished(planner, refine=refine, bound=bound, target_gap=target_gap, **given)
+    question = Question(
+        where=where, start=start, goal=goal, height_band=height_band, layers=layer, weights=weight
+    )
+    solution = _solve(chosen, question.problem(), quiet or as_json)
     # Shown before it is written, so that a full disk loses no answer.
-    _print(solution, as_json)
+    _print(solution, as_json, target_gap)
     if solution.path is not None:
         outputs.write(solution)
     return exit_code(solution)
 
 
-def _print(solution: Solution, as_json: bool) -> None:
+def _print(solution: Solution, as_json: bool, target_gap: float | None) -> None:
     if as_json:
         from ..io import route_record
 
@@ -332,7 +261,7 @@ def _print(solution: Solution, as_json: bool) -> None:
         return
     from .report import print_report
 
-    print_report(solution)
+    print_report(solution, target_gap)
 
 
 def exit_code(solution: Solution) -> ExitCode:

@@ -7,8 +7,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ..planners.base import Callback, Progress
+from ..planners.base import SEARCHING, Callback, Progress
 from ..problem import Problem
+from .report import percent
 
 
 @contextmanager
@@ -33,9 +34,19 @@ def progress_bar(problem: Problem, quiet: bool) -> Iterator[Callback | None]:
         task = bar.add_task("preparing kernels", total=None)
 
         def show(progress: Progress) -> None:
-            best = "no path yet"
-            if math.isfinite(progress.best_cost):
-                best = f"best {progress.best_cost:,.6g} {unit}".rstrip()
-            bar.update(task, description=best, total=progress.total, completed=progress.samples)
+            total = progress.total if progress.stage == SEARCHING else None
+            shown = _describe(progress, unit)
+            bar.update(task, description=shown, total=total, completed=progress.samples)
 
         yield show
+
+
+def _describe(progress: Progress, unit: str) -> str:
+    """What is being done, and how good the best is."""
+    if math.isfinite(progress.gap):
+        return f"{progress.stage}, gap {percent(progress.gap)}"
+    if progress.stage != SEARCHING:
+        return progress.stage
+    if math.isfinite(progress.best_cost):
+        return f"best {progress.best_cost:,.6g} {unit}".rstrip()
+    return "no path yet"

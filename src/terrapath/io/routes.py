@@ -28,7 +28,8 @@ def route_record(solution: Solution) -> dict[str, Any]:
 
     ``start``, ``goal`` and ``path`` are on the plane that was planned in, map units; with a
     georeference ``crs`` names that plane, and ``start_lonlat``, ``goal_lonlat`` and
-    ``path_lonlat`` are longitude and latitude in degrees.
+    ``path_lonlat`` are longitude and latitude in degrees. ``unrefined_length`` is of the
+    planner's own path where that was refined.
     """
     problem, path = solution.problem, solution.path
     points = None if path is None else path.points
@@ -36,6 +37,7 @@ def route_record(solution: Solution) -> dict[str, Any]:
         "status": solution.status.value,
         "planner": solution.planner,
         "length": _finite(solution.length),
+        "unrefined_length": None if solution.unrefined is None else solution.unrefined.length,
         "cost": _finite(solution.cost),
         "lower_bound": _finite(solution.lower_bound),
         "gap": _finite(solution.gap),
@@ -62,14 +64,27 @@ def route_record(solution: Solution) -> dict[str, Any]:
     return record
 
 
-_PROPERTIES = ("status", "planner", "length", "cost", "lower_bound", "gap", "climb", "unit")
+_PROPERTIES = (
+    "status",
+    "planner",
+    "length",
+    "unrefined_length",
+    "cost",
+    "lower_bound",
+    "gap",
+    "climb",
+    "straight_length",
+    "unit",
+    "samples",
+    "seed",
+    "layers",
+)
 
 
 def _write_geojson(solution: Solution, file: Path) -> None:
     """One feature; WGS 84 longitude and latitude on Earth (RFC 7946), else the plane's own."""
     record = route_record(solution)
-    properties = {key: record[key] for key in (*_PROPERTIES, "samples", "seed", "layers")}
-    properties["straight_length"] = record["straight_length"]
+    properties = {key: record[key] for key in _PROPERTIES}
     properties["software"] = f"terrapath {__version__}"
     reference = solution.problem.surface.georeference
     coordinates = record["path"]

@@ -2,10 +2,11 @@
 
 from .base import Planner, Progress
 from .fast_marching import FastMarching
+from .finishing import Finished, UnfinishedWarning, finish
 from .geodesic_traversal import Fan, GeodesicTraversal
 from .grid_search import AStar, Dijkstra
 from .optimal import Optimal
-from .registry import PLANNERS, finish, make_planner, plan
+from .registry import PLANNERS, make_finished, make_planner, plan
 from .rrt import RRT
 from .rrt_star import RRTStar
 
@@ -16,12 +17,15 @@ __all__ = [
     "Dijkstra",
     "Fan",
     "FastMarching",
+    "Finished",
     "GeodesicTraversal",
     "Optimal",
     "Planner",
     "Progress",
     "RRTStar",
+    "UnfinishedWarning",
     "finish",
+    "make_finished",
     "make_planner",
     "plan",
 ]

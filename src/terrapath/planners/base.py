@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -12,6 +13,10 @@ from ..problem import Problem, Solution, Status
 SEPARATED = "start and goal lie in different parts of the free space"
 
 
+# What a planner is at.
+SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bound"
+
+
 class Progress(NamedTuple):
     """Where a running planner stands."""
 
@@ -19,6 +24,15 @@ class Progress(NamedTuple):
     total: int
     seconds: float
     best_cost: float  # map units, infinite before the first path
+    lower_bound: float = 0.0  # map units, 0 before one is proven
+    stage: str = SEARCHING
+
+    @property
+    def gap(self) -> float:
+        """(best_cost - lower_bound) / lower_bound, infinite before both are known."""
+        if self.lower_bound <= 0.0:
+            return math.inf
+        return (self.best_cost - self.lower_bound) / self.lower_bound
 
 
 # Called now and then while a planner runs; returning True stops it.

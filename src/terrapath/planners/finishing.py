@@ -2,48 +2,156 @@
 
 from __future__ import annotations
 
+import math
 import time
-from dataclasses import replace
+import warnings
+from dataclasses import dataclass, replace
 
 from ..bounding import lower_bound
 from ..certificate import Certificate
-from ..problem import Solution
+from ..problem import Problem, Solution, Status
 from ..refinement import refine
+from ..validation import require_bool, require_positive
+from .base import PROVING, REFINING, Callback, Planner, Progress
+
+# What a solution says that Ctrl-C ended.
+INTERRUPT = "interrupt"
 
 
-def refined(solution: Solution) -> Solution:
+class UnfinishedWarning(RuntimeWarning):
+    """A path could not be refined or bounded, and is given as it was before."""
+
+
+def warn_unfinished(what: str, error: Exception) -> None:
+    """Tell what could not be done, and why."""
+    reason = " ".join(f"{type(error).__name__}: {error}".split())
+    warnings.warn(f"{what}: {reason}", UnfinishedWarning, stacklevel=3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """A planner whose answers are refined and bounded.
+
+    refine : take the path to the locally shortest one. bound : prove a lower bound on every
+    path's length, to a gap of one coarse lattice. target_gap : refine the bound until
+    (length - bound) / bound is met, which asks for a bound. time_limit : seconds for all
+    together, looked at between the lattices of a bound.
+
+    What the planner itself has refined or proven is not done again. An answer that was
+    interrupted is left as it is, and no failure here loses the planner's path.
+    """
+
+    planner: Planner
+    refine: bool = False
+    bound: bool = False
+    target_gap: float | None = None
+    time_limit: float | None = None
+
+    def __post_init__(self) -> None:
+        require_bool(refine=self.refine, bound=self.bound)
+        _require_limits(self.target_gap, self.time_limit)
+
+    @property
+    def name(self) -> str:
+        """The planner's name on the command line."""
+        return self.planner.name
+
+    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+        """Plan and finish. ``callback`` sees the progress and may stop the planner or the bound.
+
+        A planner that was stopped by it is finished all the same.
+        """
+        solution = self.planner.solve(problem, callback=callback)
+        return finish(
+            solution,
+            refine=self.refine,
+            bound=self.bound,
+            target_gap=self.target_gap,
+            time_limit=self.time_limit,
+            callback=callback,
+        )
+
+
+def finish(
+    solution: Solution,
+    *,
+    refine: bool = False,
+    bound: bool = False,
+    target_gap: float | None = None,
+    time_limit: float | None = None,
+    callback: Callback | None = None,
+) -> Solution:
+    """A solution refined and bounded as asked; see ``Finished``."""
+    if refine and solution.status is not Status.INTERRUPTED:
+        solution = refined(solution, callback=callback)
+    if (bound or target_gap is not None) and solution.status is not Status.INTERRUPTED:
+        rest = None if time_limit is None else max(time_limit - solution.seconds, 1e-9)
+        solution = bounded(solution, target_gap=target_gap, time_limit=rest, callback=callback)
+    return solution
+
+
+def refined(solution: Solution, *, callback: Callback | None = None) -> Solution:
     """The same solution with its path taken to the locally shortest one.
 
     ``cost`` stays what the planner believed; ``unrefined`` is the planner's own path.
     """
-    if solution.path is None or solution.problem.start == solution.problem.goal:
+    problem, given = solution.problem, solution.path
+    if given is None or solution.unrefined is not None or problem.start == problem.goal:
         return solution
     started = time.perf_counter()
-    path = refine(solution.problem, solution.path)
-    return replace(
-        solution,
-        path=path,
-        unrefined=solution.path,
-        seconds=solution.seconds + time.perf_counter() - started,
-    )
+    try:
+        _announce(solution, REFINING, callback)
+        path = refine(problem, given)
+    except KeyboardInterrupt:
+        return _interrupted(solution)
+    except Exception as error:
+        warn_unfinished("the path could not be refined and is the planner's own", error)
+        return solution
+    seconds = solution.seconds + time.perf_counter() - started
+    return replace(solution, path=path, unrefined=given, seconds=seconds)
 
 
 def bounded(
-    solution: Solution, *, target_gap: float | None = None, time_limit: float | None = None
+    solution: Solution,
+    *,
+    target_gap: float | None = None,
+    time_limit: float | None = None,
+    callback: Callback | None = None,
 ) -> Solution:
     """The same solution with a proven lower bound on every path's length.
 
-    target_gap : refine the bound until the gap is met. time_limit : seconds.
+    target_gap : refine the bound until the gap is met. time_limit : seconds. ``callback``
+    sees each bound, and ends its refinement by returning True. Ctrl-C leaves the best that
+    was proven, if any.
     """
-    if solution.path is None or solution.certificate is not None:
+    _require_limits(target_gap, time_limit)
+    if solution.path is None or _is_proven(solution, target_gap):
         return solution
-    certificate = lower_bound(
-        solution.problem,
-        length=solution.path.length,
-        target_gap=target_gap,
-        time_limit=time_limit,
-    )
-    return with_certificate(solution, certificate)
+    started, before = time.perf_counter(), solution.seconds
+    best: Certificate | None = None
+
+    def watch(certificate: Certificate) -> bool:
+        nonlocal best
+        best = certificate
+        seen = _progress(solution, PROVING, before + time.perf_counter() - started)
+        seen = seen._replace(lower_bound=float(certificate))
+        return callback is not None and bool(callback(seen))
+
+    try:
+        _announce(solution, PROVING, callback)
+        best = lower_bound(
+            solution.problem,
+            length=solution.path.length,
+            target_gap=target_gap,
+            time_limit=time_limit,
+            watch=watch,
+        )
+    except KeyboardInterrupt:
+        solution = _interrupted(solution)
+    except Exception as error:
+        warn_unfinished("no better bound could be proven", error)
+    solution = replace(solution, seconds=before + time.perf_counter() - started)
+    return solution if best is None else with_certificate(solution, best)
 
 
 def with_certificate(solution: Solution, certificate: Certificate) -> Solution:
@@ -51,3 +159,30 @@ def with_certificate(solution: Solution, certificate: Certificate) -> Solution:
     assert solution.length is not None
     value = min(certificate.value, solution.length)
     return replace(solution, lower_bound=value, certificate=certificate)
+
+
+def _require_limits(target_gap: float | None, time_limit: float | None) -> None:
+    optional = {"target_gap": target_gap, "time_limit": time_limit}
+    require_positive(**{name: value for name, value in optional.items() if value is not None})
+
+
+def _is_proven(solution: Solution, target_gap: float | None) -> bool:
+    if solution.certificate is None or solution.gap is None:
+        return False
+    return target_gap is None or solution.gap <= target_gap
+
+
+def _interrupted(solution: Solution) -> Solution:
+    return replace(solution, status=Status.INTERRUPTED, stopped_by=INTERRUPT)
+
+
+def _progress(solution: Solution, stage: str, seconds: float) -> Progress:
+    length = math.inf if solution.length is None else solution.length
+    count = solution.samples
+    return Progress(count, count, seconds, length, solution.lower_bound or 0.0, stage)
+
+
+def _announce(solution: Solution, stage: str, callback: Callback | None) -> None:
+    """Tell what begins now; the search is over, so there is nothing to stop yet."""
+    if callback is not None:
+        callback(_progress(solution, stage, solution.seconds))

@@ -7,14 +7,12 @@ import time
 from dataclasses import dataclass, replace
 
 from ..distinct_routes import routes_of_fields
-from ..bounding import lower_bound
-from ..certificate import Certificate
-from ..eikonal import Medium, march_from
+from ..eikonal import DistanceField, Medium, march_from
 from ..lattice import Lattice, default_spacing
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
 from .base import Callback, Progress, answer_without_search
-from .finishing import with_certificate
+from .finishing import INTERRUPT, bounded, warn_unfinished
 
 # Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
 HALVINGS = 2
@@ -29,7 +27,8 @@ class Optimal:
     spacing : of the nodes on which routes are searched, map units; by default a 250th of the
     region's longer side. time_limit : seconds, looked at between the stages.
 
-    ``stopped_by`` says which gap was reached.
+    ``stopped_by`` says whether the gap was met; ``unrefined`` is the path down the distance
+    field, and all there is where the search was stopped before its routes were refined.
     """
 
     target_gap: float = 1e-3
@@ -49,7 +48,10 @@ class Optimal:
         return "optimal"
 
     def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+        """Plan. ``callback`` sees the progress and stops the planner by returning True.
+
+        Ctrl-C, too, ends the search, with the best path and the best bound so far.
+        """
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
         return _Run(self, problem, callback).solve()
@@ -61,89 +63,90 @@ class _Run:
     def __init__(self, planner: Optimal, problem: Problem, callback: Callback | None) -> None:
         self.planner, self.problem, self.callback = planner, problem, callback
         self.started = time.perf_counter()
-        self.samples, self.stopped = 0, False
-        self.best = math.inf
-        self.certificate: Certificate | None = None
+        self.samples, self.total, self.stopped_by = 0, 0, ""
+        self.direct: Path | None = None
+        self.routes: tuple[Path, ...] = ()
 
     @property
     def seconds(self) -> float:
         return time.perf_counter() - self.started
 
-    def report(self, settled: int = 0) -> bool:
-        """Tell the callback how it stands; True where the run is to stop."""
-        progress = Progress(self.samples + settled, 0, self.seconds, self.best)
-        if self.callback is not None and self.callback(progress):
-            self.stopped = True
+    def see(self, progress: Progress) -> bool:
+        """Look at the callback and the clock; True where the run is to stop."""
         limit = self.planner.time_limit
-        return self.stopped or (limit is not None and self.seconds > limit)
+        if self.callback is not None and self.callback(progress):
+            self.stopped_by = "callback"
+        elif limit is not None and progress.seconds >= limit:
+            self.stopped_by = "time limit"
+        return bool(self.stopped_by)
+
+    def must_stop(self, settled: int = 0) -> bool:
+        best = self.direct.length if self.direct is not None else math.inf
+        return self.see(Progress(self.samples + settled, self.total, self.seconds, best))
 
     def solve(self) -> Solution:
-        routes: tuple[Path, ...] = ()
-        interrupted = False
         try:
-            routes = self.find_routes()
-            if routes:
-                self.best = routes[0].length
-                self.prove()
+            self.find_routes()
         except KeyboardInterrupt:
-            interrupted = True
-        return self.answer(routes, interrupted)
+            self.stopped_by = INTERRUPT
+        solution = self.answer()
+        if solution.path is None or self.stopped_by:
+            return solution
+        target = self.planner.target_gap
+        solution = bounded(solution, target_gap=target, callback=self.see)
+        if solution.status is Status.INTERRUPTED:
+            return solution
+        met = solution.gap is not None and solution.gap <= target
+        reason = "gap met" if met else self.stopped_by or "finest lattice"
+        return replace(solution, stopped_by=reason)
 
-    def find_routes(self) -> tuple[Path, ...]:
+    def find_routes(self) -> None:
         """The locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
         spacing = self.planner.spacing or default_spacing(problem.bounds)
         for _ in range(HALVINGS + 1):
             lattice = Lattice.spanning(problem.bounds, spacing)
+            self.total = self.samples + 2 * lattice.nx * lattice.ny
             medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
-            fields = []
-            for end in (problem.start, problem.goal):
-                field = march_from(
-                    problem.surface, problem.free_space, end, medium, watch=self.report
-                )
-                self.samples += int(field.reached * lattice.nx * lattice.ny)
-                fields.append(field)
-            routes = routes_of_fields(problem, fields[0], fields[1], self.planner.routes)
-            if routes or self.report():
-                return routes
+            from_start = self.march(problem.start, medium)
+            self.direct = from_start.path_to(problem.goal)
+            self.routes = () if self.direct is None else (self.direct,)
+            if self.must_stop():
+                return
+            if self.direct is not None:
+                from_goal = self.march(problem.goal, medium)
+                if not self.must_stop():
+                    self.refine_routes(from_start, from_goal)
+                return
             spacing *= 0.5
-        return ()
 
-    def prove(self) -> None:
-        """Refine the bound until the gap is met."""
+    def march(self, end: tuple[float, float], medium: Medium) -> DistanceField:
+        problem = self.problem
+        field = march_from(problem.surface, problem.free_space, end, medium, watch=self.must_stop)
+        self.samples += round(field.reached * field.values.size)
+        return field
 
-        def watch(certificate: Certificate) -> bool:
-            self.certificate = certificate
-            return self.report()
+    def refine_routes(self, from_start: DistanceField, from_goal: DistanceField) -> None:
+        try:
+            found = routes_of_fields(self.problem, from_start, from_goal, self.planner.routes)
+        except Exception as error:
+            warn_unfinished("no route could be refined; the path is fast marching's", error)
+            return
+        self.routes = found or self.routes
 
-        limit = self.planner.time_limit
-        self.certificate = lower_bound(
-            self.problem,
-            length=self.best,
-            target_gap=self.planner.target_gap,
-            time_limit=None if limit is None else max(limit - self.seconds, 1e-9),
-            watch=watch,
-        )
-
-    def answer(self, routes: tuple[Path, ...], interrupted: bool) -> Solution:
-        status = Status.SOLVED if routes else Status.NOT_FOUND
-        solution = Solution(
+    def answer(self) -> Solution:
+        """What was found, without a bound."""
+        path = self.routes[0] if self.routes else None
+        status = Status.NOT_FOUND if path is None else Status.SOLVED
+        return Solution(
             problem=self.problem,
             planner=self.planner.name,
-            status=Status.INTERRUPTED if interrupted else status,
-            path=routes[0] if routes else None,
-            cost=routes[0].length if routes else None,
+            status=Status.INTERRUPTED if self.stopped_by == INTERRUPT else status,
+            path=path,
+            cost=None if path is None else path.length,
             seconds=self.seconds,
             samples=self.samples,
-            stopped_by="no way between the nodes",
-            alternatives=routes[1:],
+            stopped_by=self.stopped_by or "no way between the nodes",
+            unrefined=None if path is self.direct else self.direct,
+            alternatives=self.routes[1:],
         )
-        if not routes:
-            return solution
-        if self.certificate is None:
-            return replace(solution, stopped_by="interrupted")
-        solution = with_certificate(solution, self.certificate)
-        assert solution.gap is not None
-        target = self.planner.target_gap
-        met = "gap met" if solution.gap <= target else f"gap of {target:.3%} not met"
-        return replace(solution, stopped_by=f"{met}: {solution.gap:.4%}")

@@ -12,12 +12,14 @@ from ..errors import InputError
 from ..problem import Problem, Solution
 from .base import Callback, Planner
 from .fast_marching import FastMarching
-from .finishing import bounded, refined
+from .finishing import Finished, finish
 from .geodesic_traversal import GeodesicTraversal
 from .grid_search import AStar, Dijkstra
 from .optimal import Optimal
 from .rrt import RRT
 from .rrt_star import RRTStar
+
+__all__ = ["PLANNERS", "finish", "make_finished", "make_planner", "plan"]
 
 PLANNERS: dict[str, Callable[..., Planner]] = {
     "rrt-star-r": partial(RRTStar, metric="riemannian"),
@@ -56,6 +58,30 @@ def make_planner(name: str, **options: Any) -> Planner:
     return PLANNERS[name](**options)
 
 
+def make_finished(
+    name: str,
+    *,
+    refine: bool = False,
+    bound: bool = False,
+    target_gap: float | None = None,
+    **options: Any,
+) -> Finished:
+    """The planner of that name, its answers refined and bounded as asked; see ``Finished``.
+
+    A time limit among the planner's options is the finishing's too, and a planner that knows
+    a target gap takes care of it by itself.
+    """
+    if target_gap is not None and name in PLANNERS and "target_gap" in _options(PLANNERS[name]):
+        options["target_gap"], target_gap = target_gap, None
+    return Finished(
+        planner=make_planner(name, **options),
+        refine=refine,
+        bound=bound,
+        target_gap=target_gap,
+        time_limit=options.get("time_limit"),
+    )
+
+
 def plan(
     problem: Problem,
     planner: str = "rrt-star-r",
@@ -70,24 +96,8 @@ def plan(
 
     refine : take the path to the locally shortest one. bound : prove a lower bound on every
     path's length. target_gap : refine the bound until (length - bound) / bound is met, which
-    asks for a bound; ``optimal`` does all three by itself.
+    asks for a bound; ``optimal`` does all three by itself. ``callback`` sees the progress of
+    each stage, and stops the planner or the bound by returning True.
     """
-    if planner == "optimal" and target_gap is not None:
-        options["target_gap"] = target_gap
-    solution = make_planner(planner, **options).solve(problem, callback=callback)
-    return finish(solution, refine=refine, bound=bound, target_gap=target_gap)
-
-
-def finish(
-    solution: Solution,
-    *,
-    refine: bool = False,
-    bound: bool = False,
-    target_gap: float | None = None,
-) -> Solution:
-    """Refine and bound a solution as asked; what ``optimal`` has done is not done again."""
-    if refine and solution.planner != "optimal":
-        solution = refined(solution)
-    if bound or target_gap is not None:
-        solution = bounded(solution, target_gap=target_gap)
-    return solution
+    chosen = make_finished(planner, refine=refine, bound=bound, target_gap=target_gap, **options)
+    return chosen.solve(problem, callback=callback)

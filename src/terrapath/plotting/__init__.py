@@ -1,5 +1,5 @@
 """Floor 6: figures."""
 
-from .figure import draw_route, plot_route
+from .figure import draw_field, draw_route, plot_field, plot_route
 
-__all__ = ["draw_route", "plot_route"]
+__all__ = ["draw_field", "draw_route", "plot_field", "plot_route"]

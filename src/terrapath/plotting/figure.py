@@ -2,35 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..eikonal import DistanceField
 from ..errors import MapError
 from ..files import written_whole
 from ..problem import Solution
+from .field_view import draw_distances
 from .map_view import draw_map
 from .perspective import draw_perspective
+from .terrain import format_length
 
 DOTS_PER_INCH = 140
 PANEL_WIDTH = 5.4  # inches
+FIELD_WIDTH = 7.0
 FORMATS = (".png", ".svg", ".pdf", ".jpg")
 
 
 def _title(solution: Solution) -> str:
     problem = solution.problem
-    unit = f" {problem.surface.unit}" if problem.surface.unit else ""
+    unit, length = problem.surface.unit, solution.length
     name = f"{problem.name}: " if problem.name else ""
-    if solution.length is None:
+    if length is None:
         return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
-    saved = 1.0 - solution.length / problem.straight_length if problem.straight_length else 0.0
+    saved = 1.0 - length / problem.straight_length if problem.straight_length else 0.0
     against = f"{abs(saved):.1%} {'shorter' if saved >= 0.0 else 'longer'} than the straight way"
-    digits = ".4f" if solution.length < 1000.0 else ",.0f"
-    return (
-        f"{name}{solution.planner}, length {solution.length:{digits}}{unit} "
+    refined = "" if solution.unrefined is None else ", refined"
+    title = (
+        f"{name}{solution.planner}{refined}, length {format_length(length, unit)} "
         f"({against}), {solution.samples:,} samples"
     )
+    if solution.lower_bound is None or solution.gap is None:
+        return title
+    bound = format_length(solution.lower_bound, unit)
+    gap = f"{100.0 * solution.gap:.3g} %"
+    return f"{title}\nproven: no path is shorter than {bound}, a gap of {gap}"
 
 
 def draw_route(solution: Solution) -> Any:
@@ -47,6 +57,21 @@ def draw_route(solution: Solution) -> Any:
     return figure
 
 
+def draw_field(field: DistanceField) -> Any:
+    """A matplotlib figure: lines of equal distance on the map."""
+    from matplotlib.figure import Figure
+
+    bounds = field.lattice.bounds
+    height = float(np.clip(FIELD_WIDTH * bounds.height / bounds.width, 3.8, 10.0)) + 0.8
+    figure = Figure(figsize=(FIELD_WIDTH + 1.6, height), layout="constrained")
+    draw_distances(figure.add_subplot(), field)
+    reached = field.values[np.isfinite(field.values)]
+    farthest = format_length(float(reached.max(initial=0.0)), field.surface.unit)
+    start = ", ".join(f"{coordinate:.6g}" for coordinate in field.source)
+    figure.suptitle(f"distance from ({start}), at most {farthest}", fontsize=12)
+    return figure
+
+
 def require_known_picture(path: Path) -> None:
     """Raise MapError for an ending that is no picture format."""
     if path.suffix.lower() not in FORMATS:
@@ -55,8 +80,16 @@ def require_known_picture(path: Path) -> None:
 
 def plot_route(solution: Solution, path: str | Path) -> None:
     """Draw a solution into a picture file, whole or not at all."""
-    target = Path(path)
+    _save(lambda: draw_route(solution), Path(path))
+
+
+def plot_field(field: DistanceField, path: str | Path) -> None:
+    """Draw a distance field into a picture file, whole or not at all."""
+    _save(lambda: draw_field(field), Path(path))
+
+
+def _save(draw: Callable[[], Any], target: Path) -> None:
     require_known_picture(target)
-    figure = draw_route(solution)
+    figure = draw()
     with written_whole(target) as temporary:
         figure.savefig(temporary, dpi=DOTS_PER_INCH)

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter
 from shapely import LineString, Polygon
 
 from ..problem import Problem, Solution
-from .terrain import LAYER_COLOURS, Terrain, height_colours, label_axes
+from .terrain import LAYER_COLOURS, Terrain, format_length, height_colours, label_axes
 
 SAMPLES = 500
 CONTOURS = 14
@@ -23,6 +23,9 @@ LAYER_CONTOURS = 5
 # In samples: without it the steps of a quantised layer draw a maze instead of contours.
 LAYER_SMOOTHING = 8.0
 PATH_COLOUR = "#e4002b"
+# Of the next best routes; further ones are not drawn.
+ALTERNATIVE_COLOURS = ("#0b3dff", "#8a2be2", "#d95f02", "#00868b", "#6b4226")
+MARKS = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
 OBSTACLE_STYLE: dict[str, Any] = {"facecolor": "#3b3b3b", "edgecolor": "black", "linewidth": 0.8}
 
 
@@ -78,6 +81,7 @@ def _draw_path(axes: Any, solution: Solution) -> None:
     if solution.path is not None:
         straight = np.array([problem.start, problem.goal])
         axes.plot(*straight.T, color="white", lw=1.1, ls=(0, (4, 3)), zorder=4, label="straight")
+        _draw_alternatives(axes, solution)
         axes.plot(
             *solution.path.points.T,
             color=PATH_COLOUR,
@@ -90,19 +94,35 @@ def _draw_path(axes: Any, solution: Solution) -> None:
     draw_ends(axes, problem)
 
 
+def _draw_alternatives(axes: Any, solution: Solution) -> None:
+    """The next best routes, thin and dashed, their lengths in the legend."""
+    halo = [patheffects.withStroke(linewidth=2.8, foreground="white", alpha=0.8)]
+    for path, colour in zip(solution.alternatives, ALTERNATIVE_COLOURS, strict=False):
+        style = {"color": colour, "lw": 1.5, "ls": (0, (5, 2)), "path_effects": halo}
+        label = f"next best, {format_length(path.length, solution.problem.surface.unit)}"
+        axes.plot(*path.points.T, zorder=4.5, label=label, **style)
+
+
 def draw_ends(axes: Any, problem: Problem) -> None:
     """Start and goal."""
-    marks = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
-    axes.plot(*problem.start, "o", color="#0b6e4f", ms=9, label="start", **marks)
-    axes.plot(*problem.goal, "*", color="#ffb000", ms=15, label="goal", **marks)
+    draw_start(axes, problem)
+    axes.plot(*problem.goal, "*", color="#ffb000", ms=15, label="goal", **MARKS)
 
 
-def draw_ground(axes: Any, problem: Problem, opacity: float = 1.0) -> Terrain:
+def draw_start(axes: Any, problem: Problem) -> None:
+    """The start alone."""
+    axes.plot(*problem.start, "o", color="#0b6e4f", ms=9, label="start", **MARKS)
+
+
+def draw_ground(
+    axes: Any, problem: Problem, opacity: float = 1.0, *, contours: bool = True
+) -> Terrain:
     """The region without a route: shade, contours, obstacles, limits and labels."""
     terrain = Terrain.sample(problem, SAMPLES)
     style = {"extent": _extent(problem), "origin": "lower", "interpolation": "bilinear"}
     axes.imshow(terrain.shaded(0), alpha=opacity, **style)
-    _draw_contours(axes, terrain)
+    if contours:
+        _draw_contours(axes, terrain)
     draw_obstacles(axes, problem, terrain)
     axes.set(xlim=_extent(problem)[:2], ylim=_extent(problem)[2:], aspect="equal")
     label_axes(axes, problem)

@@ -110,6 +110,11 @@ def height_colours() -> Any:
     return ListedColormap(colormaps[HEIGHT_COLOURS](np.linspace(0.22, 0.90, 256)))
 
 
+def format_length(length: float, unit: str) -> str:
+    """A length with its unit, as titles and legends show it."""
+    return f"{length:{'.4f' if length < 1000.0 else ',.0f'}} {unit}".rstrip()
+
+
 def label_axes(axes: Any, problem: Problem) -> None:
     """Axis labels with units; kilometres where metres would be long."""
     unit = problem.surface.unit

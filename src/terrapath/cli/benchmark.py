@@ -1,0 +1,48 @@
+"""``terrapath benchmark``: against the clock, the truth and the peers."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .exit_codes import ExitCode
+from .reproduce import _stages
+
+
+def benchmark_command(
+    what: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[WHAT]...", help="Some of bound, fast-marching and path."),
+    ] = None,
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="Fewer repetitions, smaller lattices: about a minute."),
+    ] = False,
+    output: Annotated[
+        Path, typer.Option(metavar="DIR", help="Directory for pictures, measures and report.")
+    ] = Path("benchmark"),
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
+) -> int:
+    """Measure bounds, fast marching and paths against the clock, the truth and the peers.
+
+    Peers that are not installed are named and left out. A run that was stopped goes on where
+    it was when the same command is given again. Nothing else should run on the machine.
+    Exit codes: 0 done, whatever was measured, 2 bad input, 130 interrupted.
+    """
+    try:
+        from ..experiments.benchmarks.run import benchmark
+
+        with _stages(quiet) as watch:
+            report = benchmark(what or (), output, quick=quick, watch=watch)
+    except KeyboardInterrupt:
+        print(
+            f"terrapath: interrupted; what was measured is kept in {output / 'trials'}, and "
+            "the same command goes on from there",
+            file=sys.stderr,
+        )
+        return ExitCode.INTERRUPTED
+    typer.echo(report)
+    return ExitCode.SOLVED

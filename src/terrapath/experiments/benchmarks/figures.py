@@ -1,0 +1,165 @@
+"""The benchmarks' pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ..figures import _figure, _save
+from .bound import GAP_TARGETS, BoundData
+from .marching import REFERENCE_ERRORS, MarchData, MarchRow
+from .paths import NEAR, TARGET_SCENE, TARGET_SECONDS, PathsData, PathsFound
+from .timing import percent
+
+TARGET_COLOUR = "#e4002b"
+
+# Excesses below this are rounding.
+LEAST_EXCESS = 1e-9
+
+
+def _label_percent(axis: Any) -> None:
+    axis.set_major_formatter(lambda value, _: percent(value))
+    axis.set_minor_formatter("")
+
+
+def _label_plain(axis: Any) -> None:
+    axis.set_major_formatter("{x:,g}")
+    axis.set_minor_formatter("")
+
+
+def draw_bound(data: BoundData, directory: Path) -> list[Path]:
+    """Gap against seconds, a line a scene."""
+    figure = _figure(8.0, 5.4)
+    axes = figure.subplots()
+    for scene, found in data.items():
+        seconds = [step.timing.seconds for step in found.steps]
+        axes.loglog(seconds, [step.gap for step in found.steps], "o-", lw=1.6, ms=5, label=scene)
+    for gap, limit in GAP_TARGETS:
+        axes.plot([1e-9, limit, limit], [gap, gap, 1e-9], ":", color=TARGET_COLOUR, lw=1.2)
+        axes.plot(limit, gap, "s", color=TARGET_COLOUR, ms=7)
+        axes.annotate(
+            f"target: {percent(gap)} in {limit:g} s",
+            (limit, gap),
+            (6, 6),
+            textcoords="offset points",
+            color=TARGET_COLOUR,
+            fontsize=9,
+        )
+    steps = [step for found in data.values() for step in found.steps]
+    seconds = [step.timing.seconds for step in steps] + [limit for _, limit in GAP_TARGETS]
+    gaps = [step.gap for step in steps] + [gap for gap, _ in GAP_TARGETS]
+    axes.set(
+        xlim=(0.6 * min(seconds), 1.7 * max(seconds)),
+        ylim=(0.6 * min(gaps), 2.0 * max(gaps)),
+        xlabel="seconds",
+        ylabel="proven gap, (length - bound) / bound",
+        title="Lower bounds with certificates",
+    )
+    _label_plain(axes.xaxis)
+    _label_percent(axes.yaxis)
+    axes.grid(alpha=0.3, which="both")
+    axes.legend(fontsize=9)
+    path = directory / "benchmark-bound.png"
+    _save(figure, path)
+    return [path]
+
+
+def _draw_seconds(axes: Any, rows: dict[str, list[MarchRow]]) -> None:
+    for scene, found in rows.items():
+        nodes = [row.nodes for row in found]
+        axes.loglog(nodes, [row.found.whole.seconds for row in found], "o-", label=scene)
+    first = next(iter(rows.values()))
+    peers = [(row.nodes, row.found.peer.seconds) for row in first if row.found.peer is not None]
+    if peers:
+        label = "scikit-fmm, isotropic"
+        axes.loglog(*zip(*peers, strict=True), "x--", color="black", alpha=0.6, label=label)
+    axes.set(ylabel="seconds", title="from the surface to the distance field")
+
+
+def _draw_errors(axes: Any, rows: dict[str, list[MarchRow]]) -> None:
+    for k, (scene, found) in enumerate(rows.items()):
+        nodes, errors = [row.nodes for row in found], [abs(row.error) for row in found]
+        axes.loglog(nodes, errors, "o-", color=f"C{k}", label=scene)
+        known = [(n, abs(error)) for (s, n), error in REFERENCE_ERRORS.items() if s == scene]
+        label = f"{scene}, HamiltonFastMarching"
+        axes.loglog(*zip(*known, strict=True), "D", mfc="none", ms=8, color=f"C{k}", label=label)
+    axes.set(ylabel="relative error, absolute", title="error at the goal")
+    _label_percent(axes.yaxis)
+
+
+def draw_marching(data: MarchData, directory: Path) -> list[Path]:
+    """Seconds and errors against the nodes of a side."""
+    rows: dict[str, list[MarchRow]] = {}
+    for row in data.rows:
+        rows.setdefault(row.scene, []).append(row)
+    figure = _figure(12.0, 5.0)
+    left, right = figure.subplots(1, 2)
+    _draw_seconds(left, rows)
+    _draw_errors(right, rows)
+    for axes in (left, right):
+        axes.set_xlabel("nodes a side")
+        # 961 and 1,001 would lie on each other.
+        axes.set_xticks(sorted({row.nodes for row in data.rows} - {961}))
+        _label_plain(axes.xaxis)
+        axes.grid(alpha=0.3, which="both")
+        axes.legend(fontsize=9)
+    _label_plain(left.yaxis)
+    path = directory / "benchmark-fast-marching.png"
+    _save(figure, path)
+    return [path]
+
+
+# Marks and colours of planners, by how their labels begin.
+MARKS = {
+    "fast marching, refined": ("*", "#2ca02c"),
+    "fast marching": ("o", "#2ca02c"),
+    "optimal": ("P", "#d62728"),
+    "RRT*-R until": ("v", "#08519c"),
+    "RRT*-R": ("^", "#6baed6"),
+    "Dijkstra": ("s", "#7f7f7f"),
+    "A*": ("D", "#bcbd22"),
+}
+
+
+def _draw_planners(axes: Any, labels: list[str], found: list[PathsFound]) -> None:
+    for label, result in zip(labels, found, strict=True):
+        name = label.replace("\\", "")
+        marker, colour = next(mark for start, mark in MARKS.items() if name.startswith(start))
+        axes.loglog(
+            result.timing.seconds,
+            max(result.typical_excess, LEAST_EXCESS),
+            marker,
+            color=colour,
+            mfc="none" if name.endswith("32 neighbours") else colour,
+            ms=11 if marker == "*" else 7,
+            label=name,
+        )
+    trees = [r for label, r in zip(labels, found, strict=True) if label.endswith("samples")]
+    seconds, excess = [r.timing.seconds for r in trees], [r.typical_excess for r in trees]
+    axes.loglog(seconds, excess, "-", lw=1.0, color=MARKS["RRT*-R"][1])
+
+
+def draw_paths(data: PathsData, directory: Path) -> list[Path]:
+    """Excess against seconds, a panel a scene, a mark a planner."""
+    columns = min(len(data.found), 3)
+    rows = -(-len(data.found) // columns)
+    figure = _figure(4.4 * columns + 2.2, 3.7 * rows)
+    panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
+    for axes, (scene, found) in zip(panels.flat, data.found.items(), strict=False):
+        _draw_planners(axes, data.labels, found)
+        axes.axhline(NEAR, color=TARGET_COLOUR, ls=":", lw=1.2)
+        if scene == TARGET_SCENE:
+            axes.axvline(TARGET_SECONDS, color=TARGET_COLOUR, ls=":", lw=1.2)
+        axes.set_title(scene)
+        axes.grid(alpha=0.3)
+        _label_plain(axes.xaxis)
+        _label_percent(axes.yaxis)
+    for axes in panels[-1]:
+        axes.set_xlabel("seconds")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("longer than the shortest by")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right upper", fontsize=9)
+    path = directory / "benchmark-path.png"
+    _save(figure, path)
+    return [path]

@@ -1,0 +1,119 @@
+"""What is measured in a process that has done nothing before: ``python -m ... TASK``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import scenes
+from ...eikonal import DistanceField, Medium, march_from
+from ...lattice import Lattice
+from ...problem import Problem
+from .marching import Marched, MarchRuns
+from .peers import SCIKIT_FMM
+from .timing import Reading, Timing, timed
+
+# Nodes on a side of the lattice that everything is compiled on.
+SMALL = 61
+
+
+def peak_memory() -> int | None:
+    """The most memory that this process has had, bytes; None where the system does not tell.
+
+    Not by ``ru_maxrss`` on Linux: a process inherits its parent's there.
+    """
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return _peak_memory_elsewhere()
+    return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
+
+
+def _peak_memory_elsewhere() -> int | None:
+    try:
+        import resource
+    except ImportError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
+
+
+class Bench:
+    """One scene on one lattice."""
+
+    def __init__(self, problem: Problem, nodes: int) -> None:
+        self.problem = problem
+        self.lattice = Lattice(problem.bounds, nodes, nodes)
+
+    def medium(self) -> Medium:
+        """Stencils and readers."""
+        return Medium.of_surface(self.problem.surface, self.lattice, self.problem.free_space)
+
+    def march(self, medium: Medium) -> DistanceField:
+        """The distance field from the start."""
+        problem = self.problem
+        return march_from(problem.surface, problem.free_space, problem.start, medium)
+
+    def distance(self) -> float:
+        """From start to goal, map units."""
+        return float(self.march(self.medium()).at(self.problem.goal))
+
+    def laps(self) -> list[Reading]:
+        """Medium, readers alone, march."""
+        medium, first = timed(self.medium)
+        _, third = timed(lambda: self.march(medium))
+        _, second = timed(lambda: Medium(self.lattice, medium.nodes))
+        return [first, second, third]
+
+    def peer_lap(self, skfmm: Any) -> Reading:
+        """The same lattice on flat ground, all speeds 1, second order."""
+        lattice, start = self.lattice, self.problem.start
+        phi = np.ones((lattice.ny, lattice.nx))
+        speed = np.ones_like(phi)
+        column = round((start[0] - lattice.bounds.x1_min) / lattice.dx)
+        row = round((start[1] - lattice.bounds.x2_min) / lattice.dy)
+        phi[row, column] = -1.0
+        return timed(lambda: skfmm.travel_time(phi, speed, dx=lattice.dx, order=2))[1]
+
+
+def forget_peak() -> None:
+    """Let the peak start anew from here, where the system can; compiling had one of its own."""
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+
+
+def measure_marching(scene: str, runs: MarchRuns) -> Marched:
+    """Memory first, then seconds, ours and the peer's by turns."""
+    problem = scenes.load(scene)
+    Bench(problem, SMALL).distance()
+    forget_peak()
+    before = peak_memory()
+    bench = Bench(problem, runs.nodes)
+    distance = bench.distance()
+    peak = peak_memory()
+    skfmm = None if runs.peer is None else SCIKIT_FMM.load()
+    laps, peer_laps = [], []
+    for _ in range(runs.repeats):
+        laps.append(bench.laps())
+        if skfmm is not None:
+            peer_laps.append(bench.peer_lap(skfmm))
+    medium, readers, march = (Timing.of(readings) for readings in zip(*laps, strict=True))
+    peer = Timing.of(peer_laps) if peer_laps else None
+    return Marched(medium, readers, march, peer, distance, before, peak)
+
+
+def main(task: str) -> None:
+    """Measure and print the result as JSON. task : scene and settings, JSON."""
+    options = json.loads(task)
+    scene = options.pop("scene")
+    print(json.dumps(asdict(measure_marching(scene, MarchRuns(**options)))))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

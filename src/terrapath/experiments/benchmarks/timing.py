@@ -1,0 +1,119 @@
+"""Clocks, targets, and results as they come back from their files."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from statistics import median
+from types import UnionType
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+
+Work = TypeVar("Work")
+
+
+class Reading(NamedTuple):
+    """Seconds since a stopwatch was started, by two clocks."""
+
+    wall: float
+    processor: float
+
+
+class Stopwatch:
+    """Runs from when it is made."""
+
+    def __init__(self) -> None:
+        self._wall, self._processor = time.perf_counter(), time.process_time()
+
+    def read(self) -> Reading:
+        """Seconds since the start."""
+        return Reading(time.perf_counter() - self._wall, time.process_time() - self._processor)
+
+
+def timed(work: Callable[[], Work]) -> tuple[Work, Reading]:
+    """What some work returns, and how long it took."""
+    watch = Stopwatch()
+    result = work()
+    return result, watch.read()
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long the same work took, an entry a repetition. Seconds."""
+
+    wall: tuple[float, ...]
+    processor: tuple[float, ...]
+
+    @classmethod
+    def of(cls, readings: Iterable[Reading]) -> Timing:
+        """The readings of all repetitions."""
+        return cls(*map(tuple, zip(*readings, strict=True)))
+
+    def __add__(self, other: Timing) -> Timing:
+        """Of two kinds of work together, repetition by repetition."""
+        pairs = zip((self.wall, self.processor), (other.wall, other.processor), strict=True)
+        return Timing(*(tuple(a + b for a, b in zip(*pair, strict=True)) for pair in pairs))
+
+    @property
+    def seconds(self) -> float:
+        """The median, by the clock that shows less.
+
+        Processor time leaves out waiting while other jobs had the core; wall time is the less
+        where work is spread over several cores.
+        """
+        return min(median(self.wall), median(self.processor))
+
+    @property
+    def waiting(self) -> float:
+        """Wall time over processor time, by their medians."""
+        return median(self.wall) / median(self.processor)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A figure that is to be reached, and what was measured."""
+
+    what: str
+    limit: float
+    unit: str
+    found: float | None  # None where it was never reached
+    instead: str = ""  # said then
+
+    @property
+    def met(self) -> bool:
+        """Is what was found no more than the limit?"""
+        return self.found is not None and self.found <= self.limit
+
+    @property
+    def verdict(self) -> str:
+        """Met or not, and by how much."""
+        if self.found is None:
+            return f"**not met**: {self.instead}"
+        share = f"{self.found / self.limit:.2g} times the limit"
+        return f"met, {share}" if self.met else f"**not met**, {share}"
+
+
+def percent(share: float) -> str:
+    """A share in percent, to three digits."""
+    return f"{100.0 * share:.3g} %"
+
+
+def rebuilt(kind: Any, record: Any) -> Any:
+    """What ``dataclasses.asdict`` made a record of, from its JSON.
+
+    kind : a dataclass whose fields are numbers, texts, dataclasses, tuples of one kind, or
+    one of these or None.
+    """
+    if record is None:
+        return None
+    if get_origin(kind) is UnionType:
+        kind = next(choice for choice in get_args(kind) if choice is not type(None))
+    if get_origin(kind) is tuple:
+        return tuple(rebuilt(get_args(kind)[0], item) for item in record)
+    if not dataclasses.is_dataclass(kind):
+        return record
+    hints = get_type_hints(kind)
+    fields = {field.name: record[field.name] for field in dataclasses.fields(kind)}
+    made: Any = kind
+    return made(**{name: rebuilt(hints[name], value) for name, value in fields.items()})

@@ -1,0 +1,66 @@
+"""A distance field from above: lines of equal distance over the shaded ground."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.ticker import MaxNLocator
+
+from ..eikonal import DistanceField
+from ..problem import Problem
+from ..validation import Array
+from .map_view import draw_ground, draw_start
+
+LINES = 24
+LINE_COLOURS = "plasma"
+PALE = 0.75  # opacity of the ground
+HATCH = "////"
+
+
+def _as_problem(field: DistanceField) -> Problem:
+    """The ground of a field, as a problem that starts and ends at its source."""
+    space, nodata = field.free_space, field.surface.nodata
+    masks = [mask for mask in space.masks if mask is not nodata]
+    obstacles = [*space.geometries, *space.circles, *masks]
+    return Problem(field.surface, field.source, field.source, field.lattice.bounds, obstacles)
+
+
+def _draw_lines(axes: Any, field: DistanceField, values: Array, unit: str) -> None:
+    """Lines of equal distance, labelled."""
+    lattice = field.lattice
+    ticks = MaxNLocator(LINES, steps=[1, 2, 5, 10]).tick_values(0.0, float(values.max()))
+    levels = [level for level in ticks if level > 0.0]
+    style = {"levels": levels, "cmap": LINE_COLOURS, "linewidths": 1.3}
+    lines = axes.contour(lattice.x, lattice.y, values, zorder=4, **style)
+    halo = patheffects.withStroke(linewidth=2.4, foreground="white", alpha=0.8)
+    lines.set_path_effects([halo])
+    kilometres = unit == "m" and float(values.max()) >= 10_000.0
+    labels = lines.clabel(fontsize=8, fmt=lambda at: f"{at / 1000.0 if kilometres else at:g}")
+    for text in labels:
+        text.set(color="black", path_effects=[halo])
+    label = f"distance ({'km' if kilometres else unit})".replace(" ()", "")
+    bar = axes.figure.colorbar(lines, ax=axes, label=label, shrink=0.72, pad=0.02)
+    if kilometres:
+        bar.ax.yaxis.set_major_formatter(lambda level, _: f"{level / 1000.0:g}")
+
+
+def _hatch(axes: Any, field: DistanceField) -> None:
+    """Where no node was reached."""
+    missing = ~np.isfinite(field.values)
+    if missing.any():
+        lattice = field.lattice
+        style = {"levels": [0.5, 1.5], "colors": "none", "hatches": [HATCH], "zorder": 5}
+        axes.contourf(lattice.x, lattice.y, missing.astype(np.float64), **style)
+
+
+def draw_distances(axes: Any, field: DistanceField) -> None:
+    """Draw a field onto two-dimensional axes; what was not reached is hatched."""
+    problem = _as_problem(field)
+    draw_ground(axes, problem, PALE, contours=False)
+    values = np.ma.masked_invalid(field.values)
+    _hatch(axes, field)
+    if values.count() and values.max() > 0.0:
+        _draw_lines(axes, field, values, problem.surface.unit)
+    draw_start(axes, problem)
