@@ -14,8 +14,11 @@ from rasterio.transform import from_origin
 
 import terrapath as tp
 from terrapath.cli.main import run
+from terrapath.planners import PLANNERS, finishing
 
 FAST = ["--samples", "300"]
+# What the planner found, and nothing more.
+RAW = ["--no-refine", "--no-bound"]
 
 
 @pytest.fixture
@@ -53,7 +56,7 @@ def json_of(capsys, *arguments):
 
 
 def test_json_has_the_promised_keys_and_the_path_is_as_long_as_it_says(capsys):
-    code, answer = json_of(capsys, "six-peaks", *FAST, "--seed", "4")
+    code, answer = json_of(capsys, "six-peaks", *FAST, "--seed", "4", *RAW)
     assert code == 0
     promised = [
         "status",
@@ -83,7 +86,7 @@ def test_json_has_the_promised_keys_and_the_path_is_as_long_as_it_says(capsys):
 def test_the_command_and_the_library_give_the_same_route(capsys):
     _, answer = json_of(
         capsys, "one-peak", *FAST, "--seed", "2", "--step", "0.7", "--uniform", "--planner",
-        "rrt-star",
+        "rrt-star", *RAW,
     )  # fmt: skip
     planner = tp.RRTStar(samples=300, seed=2, step=0.7, informed=False, metric="chord")
     solution = planner.solve(tp.scenes.load("one-peak"))
@@ -100,14 +103,15 @@ def test_start_and_goal_can_be_given_and_equal_ends_give_a_path_of_length_zero(c
 
 def test_the_table_shows_what_was_asked_for(capsys):
     assert run(["plan", "three-peaks", *FAST]) == 0
-    table = capsys.readouterr().out
-    for word in ("status", "true length", "straight-line length", "climb", "samples", "seconds"):
-        assert word in table
-    assert "edges pruned" in " ".join(table.split())
+    table = " ".join(capsys.readouterr().out.split())
+    words = "status", "true length", "straight-line length", "climb", "samples", "seconds"
+    proven = "lower bound", "no path is shorter", "gap", "planner's path", "% longer"
+    for word in (*words, *proven, "edges pruned"):
+        assert word in table, word
 
 
 def test_jacksboro_answers_in_metres_and_in_degrees(capsys):
-    code, answer = json_of(capsys, "jacksboro", "--samples", "2000")
+    code, answer = json_of(capsys, "jacksboro", "--samples", "2000", *RAW)
     assert code == 0
     assert answer["unit"] == "m"
     assert answer["start_lonlat"] == pytest.approx(tp.scenes.JACKSBORO_START, abs=1e-9)
@@ -123,8 +127,9 @@ def test_jacksboro_answers_in_metres_and_in_degrees(capsys):
 
 def test_degrees_are_taken_for_jacksboro(capsys):
     code, answer = json_of(
-        capsys, "jacksboro", "--samples", "2000", "--start", "-84.2,36.5", "--goal", "-84.15,36.6"
-    )
+        capsys, "jacksboro", "--samples", "2000", "--start", "-84.2,36.5", "--goal", "-84.15,36.6",
+        *RAW,
+    )  # fmt: skip
     assert code == 0
     assert answer["start_lonlat"] == pytest.approx([-84.2, 36.5], abs=1e-9)
 
@@ -137,10 +142,12 @@ def test_a_raster_with_layers_is_planned_and_written_in_every_format(dem, tmp_pa
     code, answer = json_of(capsys, *arguments)
     assert code == 0
     assert answer["layers"] == {"height": 1.0, "rocks": 50.0}
+    assert answer["lower_bound"] <= answer["length"] <= answer["unrefined_length"]
     assert json.loads(outputs[2].read_text())["path"] == answer["path"]
     feature = json.loads(outputs[0].read_text())["features"][0]
     assert feature["geometry"]["coordinates"] == answer["path_lonlat"]
-    assert feature["properties"]["length"] == answer["length"]
+    for key in ("length", "lower_bound", "gap", "unrefined_length"):
+        assert feature["properties"][key] == answer[key]
     header, *rows = outputs[1].read_text().splitlines()
     assert header == "distance,x1,x2,longitude,latitude,height [m],rocks"
     assert float(rows[-1].split(",")[0]) == pytest.approx(answer["length"], rel=1e-9)
@@ -148,14 +155,15 @@ def test_a_raster_with_layers_is_planned_and_written_in_every_format(dem, tmp_pa
 
 
 def test_weights_change_the_route(dem, capsys):
-    _, plain = json_of(capsys, str(dem), *ENDS, "--samples", "3000")
-    _, steep = json_of(capsys, str(dem), *ENDS, "--samples", "3000", "--weight", "height=20")
+    _, plain = json_of(capsys, str(dem), *ENDS, "--samples", "3000", *RAW)
+    asked = [str(dem), *ENDS, "--samples", "3000", "--weight", "height=20"]
+    _, steep = json_of(capsys, *asked, *RAW)
     assert steep["climb"] < 0.5 * plain["climb"]
 
 
-def bad(capsys, arguments, *words, code=2):
+def refused(capsys, command, arguments, *words):
     """Run, and see one line on standard error that holds all the words."""
-    assert run(["plan", *arguments]) == code
+    assert run([command, *arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.startswith("terrapath: ")
@@ -163,6 +171,10 @@ def bad(capsys, arguments, *words, code=2):
     assert "Traceback" not in captured.err
     for word in words:
         assert word in captured.err, captured.err
+
+
+def bad(capsys, arguments, *words):
+    refused(capsys, "plan", arguments, *words)
 
 
 BAD_ARGUMENTS = {
@@ -192,7 +204,33 @@ BAD_ARGUMENTS = {
     ),
     "option of grid planners": (["six-peaks", "--spacing", "0.1"], "spacing", "step"),
     "too many nodes": (["six-peaks", "--planner", "a-star", "--spacing", "1e-6"], "wider"),
-    "five neighbours": (["six-peaks", "--planner", "a-star", "--neighbours", "5"], "neighbours=5"),
+    "far too many nodes": (["six-peaks", "--planner", "optimal", "--spacing", "1e-9"], "wider"),
+    "nine neighbours": (["six-peaks", "--planner", "a-star", "--neighbours", "9"], "neighbours=9"),
+    "samples of optimal": (
+        ["six-peaks", "--planner", "optimal", "--samples", "9"],
+        "optimal has no option 'samples'",
+        "target_gap, routes",
+    ),
+    "routes of a tree": (["six-peaks", "--routes", "2"], "rrt-star-r has no option 'routes'"),
+    "no routes": (["six-peaks", "--planner", "optimal", "--routes", "0"], "routes=0"),
+    "no gap": (["six-peaks", "--target-gap", "0"], "target_gap=0", "above 0"),
+    "negative gap": (["six-peaks", "--target-gap", "-0.1"], "target_gap=-0.1", "above 0"),
+    "NaN gap": (["six-peaks", "--target-gap", "nan"], "target_gap=nan"),
+    "no gap of optimal": (["six-peaks", "--planner", "optimal", "--target-gap", "0"], "above 0"),
+    "gap without bound": (
+        ["six-peaks", "--no-bound", "--target-gap", "0.1"],
+        "--target-gap",
+        "--no-bound",
+    ),
+    "certificate without bound": (
+        ["six-peaks", "--no-bound", "--certificate", "a.npz"],
+        "--certificate",
+        "--no-bound",
+    ),
+    "optimal without bound": (["six-peaks", "--planner", "optimal", "--no-bound"], "optimal"),
+    "optimal unrefined": (["six-peaks", "--planner", "optimal", "--no-refine"], "optimal"),
+    "certificate as text": (["six-peaks", "--certificate", "a.txt"], "a.txt", ".npz"),
+    "certificate nowhere": (["six-peaks", "--certificate", "no/a.npz"], "no/a.npz", "directory"),
     "misspelt option": (["six-peaks", "--plannr", "rrt"], "--plannr", "--planner"),
     "layer on a scene": (["six-peaks", "--layer", "a=b.tif"], "--layer", "six-peaks"),
     "unknown weight": (["six-peaks", "--weight", "foo=3"], "foo", "resistance"),
@@ -270,7 +308,7 @@ def test_no_path_within_the_limits_exits_with_3_and_writes_nothing(tmp_path, cap
     assert answer["length"] is None
 
 
-@pytest.mark.parametrize("planner", ["rrt-star-r", "rrt", "a-star"])
+@pytest.mark.parametrize("planner", PLANNERS)
 def test_an_enclosed_goal_exits_with_4(planner, tmp_path, capsys):
     heights = np.zeros((40, 40))
     heights[8:20, 8:20] = -9999.0
@@ -294,7 +332,7 @@ def test_an_enclosed_goal_exits_with_4(planner, tmp_path, capsys):
 
 def test_grid_planners_take_their_options(capsys):
     asked = ["one-peak", "--spacing", "0.4", "--neighbours", "8", "--planner"]
-    answers = [json_of(capsys, *asked, name) for name in ("dijkstra", "a-star")]
+    answers = [json_of(capsys, *asked, name, *RAW) for name in ("dijkstra", "a-star")]
     assert [code for code, _ in answers] == [0, 0]
     assert answers[0][1]["cost"] == pytest.approx(answers[1][1]["cost"], rel=1e-14)
     assert answers[0][1]["seed"] is None
@@ -326,6 +364,210 @@ def test_ctrl_c_exits_with_130_and_writes_the_best_so_far(tmp_path):
     assert answer["length"] > 17.018129
 
 
+def test_a_path_is_refined_and_bounded_unless_told_otherwise(tmp_path, capsys):
+    proof = tmp_path / "proof.npz"
+    asked = ["one-peak", *FAST, "--seed", "3"]
+    _, raw = json_of(capsys, *asked, *RAW)
+    assert raw["unrefined_length"] is raw["lower_bound"] is raw["gap"] is None
+    _, finished = json_of(capsys, *asked, "--certificate", str(proof))
+    truth = tp.scenes.SCENES["one-peak"].true_length
+    assert finished["unrefined_length"] == raw["length"] > truth
+    assert finished["length"] == pytest.approx(truth, rel=1e-7)
+    assert truth * 0.99 < finished["lower_bound"] <= truth
+    gap = finished["length"] / finished["lower_bound"] - 1.0
+    assert finished["gap"] == pytest.approx(gap)
+    problem = tp.scenes.load("one-peak")
+    assert tp.Certificate.load(proof).check(problem) == finished["lower_bound"]
+
+
+def test_the_report_says_whether_the_target_gap_was_met(capsys):
+    asked = ["plan", "one-peak", *FAST, "--target-gap"]
+    assert run([*asked, "0.05"]) == 0
+    assert "the target of 5 % is met" in capsys.readouterr().out
+    assert run([*asked, "1e-9", "--time-limit", "0.001"]) == 0
+    assert "the target of 1e-07 % is not met" in capsys.readouterr().out
+
+
+def test_optimal_takes_its_options_and_shows_other_routes(capsys):
+    asked = ["six-peaks", "--planner", "optimal", "--routes", "2", "--spacing", "0.1"]
+    code, answer = json_of(capsys, *asked, "--target-gap", "0.01")
+    assert code == 0
+    truth = tp.scenes.SCENES["six-peaks"].true_length
+    assert answer["length"] == pytest.approx(truth, rel=1e-7)
+    assert answer["gap"] <= 0.01
+    assert answer["stopped_by"] == "gap met"
+    assert answer["alternatives"] == pytest.approx([truth], rel=1e-7)
+    assert run(["plan", *asked, "--target-gap", "0.01"]) == 0
+    assert "next best 17.0181" in " ".join(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_the_goal_may_lie_on_the_edge_of_the_bounds(planner, capsys):
+    code, answer = json_of(capsys, "one-peak", "--planner", planner, "--goal", "11,4", *(
+        [] if planner == "optimal" else RAW
+    ))  # fmt: skip
+    assert code == 0
+    assert answer["path"][-1] == [11.0, 4.0]
+
+
+def test_a_planner_without_a_path_gets_no_bound(capsys, monkeypatch):
+    monkeypatch.setattr(finishing, "lower_bound", None)
+    monkeypatch.setattr(finishing, "refine", None)
+    code, answer = json_of(capsys, "six-peaks", "--samples", "20", "--step", "0.1")
+    assert code == 3
+    assert answer["lower_bound"] is None
+
+
+@pytest.mark.parametrize("stage", ["refine", "lower_bound"])
+def test_ctrl_c_while_a_path_is_finished_loses_nothing(stage, tmp_path, capsys, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(finishing, stage, interrupt)
+    files = [tmp_path / "a.json", tmp_path / "a.geojson"]
+    asked = ["six-peaks", *FAST, "--certificate", str(tmp_path / "a.npz"), "--json"]
+    for file in files:
+        asked += ["--output", str(file)]
+    assert run(["plan", *asked]) == 130
+    captured = capsys.readouterr()
+    answer = json.loads(captured.out)
+    assert answer["status"] == "interrupted"
+    assert answer["length"] > 17.0181
+    assert answer["lower_bound"] is None
+    assert (answer["unrefined_length"] is None) == (stage == "refine")
+    assert json.loads(files[0].read_text())["path"] == answer["path"]
+    assert sorted(tmp_path.iterdir()) == sorted(files)
+    assert "no bound was proven" in captured.err
+
+
+def test_a_failure_while_a_path_is_finished_loses_nothing(capsys, monkeypatch):
+    def fail(*_, **__):
+        raise ArithmeticError("by zero")
+
+    monkeypatch.setattr(finishing, "refine", fail)
+    monkeypatch.setattr(finishing, "lower_bound", fail)
+    assert run(["plan", "six-peaks", *FAST, "--json"]) == 0
+    captured = capsys.readouterr()
+    answer = json.loads(captured.out)
+    assert answer["status"] == "solved"
+    assert answer["unrefined_length"] is answer["lower_bound"] is None
+    refining, bounding = captured.err.splitlines()
+    assert refining.startswith("terrapath: the path could not be refined")
+    assert bounding.startswith("terrapath: no better bound could be proven")
+    assert "ArithmeticError: by zero" in refining
+
+
+# Check
+
+
+@pytest.fixture(scope="module")
+def proof(tmp_path_factory):
+    path = tmp_path_factory.mktemp("proof") / "proof.npz"
+    assert run(["plan", "one-peak", *FAST, "--goal", "9,8", "--certificate", str(path), "-q"]) == 0
+    return path
+
+
+def test_a_certificate_is_proven_again(proof, capsys):
+    assert run(["check", "one-peak", str(proof), "--goal", "9,8"]) == 0
+    table = capsys.readouterr().out
+    assert f"{tp.Certificate.load(proof).value:.6f}" in table
+    for word in ("holds", "proven bound", "dual norm", "cells", "seconds"):
+        assert word in table
+
+
+def with_member(proof, file, name, change):
+    """A copy of a certificate with one member changed."""
+    with np.load(proof) as archive:
+        members = dict(archive)
+    members[name] = change(members[name])
+    np.savez(file, **members)
+
+
+def nudged(array):
+    changed = array.copy()
+    changed.flat[array.size // 2] += 1e-3
+    return changed
+
+
+def test_what_does_not_hold_gives_one_clear_line(proof, tmp_path, capsys):
+    bad_check = ["one-peak", str(proof), "--goal", "9,8"]
+    refused(capsys, "check", ["one-peak", str(proof)], "surface, weights, obstacles, start or goal")
+    refused(capsys, "check", [*bad_check, "--start", "1,1"], "start or goal differ")
+    refused(capsys, "check", [*bad_check, "--weight", "height=2"], "weights")
+    changed = tmp_path / "changed.npz"
+    for name in ("value", "coefficients", "horizon"):
+        with_member(proof, changed, name, nudged)
+        refused(capsys, "check", ["one-peak", str(changed), "--goal", "9,8"])
+
+
+def test_files_that_are_no_certificates_give_one_clear_line(proof, tmp_path, capsys):
+    text, half, flipped = (tmp_path / name for name in ("text.npz", "half.npz", "flipped.npz"))
+    text.write_text("a proof")
+    whole = bytearray(proof.read_bytes())
+    half.write_bytes(whole[: len(whole) // 2])
+    whole[len(whole) // 2] ^= 255
+    flipped.write_bytes(whole)
+    np.savez(tmp_path / "other.npz", values=np.zeros(3))
+    for name in ("text", "half", "flipped", "other", "missing"):
+        path = str(tmp_path / f"{name}.npz")
+        refused(capsys, "check", ["one-peak", path, "--goal", "9,8"], name, "not a certificate")
+    refused(capsys, "check", ["one-peak", str(tmp_path), "--goal", "9,8"], "not a certificate")
+    refused(capsys, "check", ["one-peak"], "CERTIFICATE")
+
+
+# Field
+
+
+def test_a_field_is_written_and_drawn(tmp_path, capsys):
+    files = [tmp_path / name for name in ("f.tif", "f.npz", "f.png")]
+    asked = ["six-peaks", "--start", "1,2", "--spacing", "0.2", "--plot", str(files[2])]
+    assert run(["field", *asked, "--output", str(files[0]), "--output", str(files[1])]) == 0
+    table = capsys.readouterr().out
+    for word in ("61 x 61, 100 % reached", "spacing", "farthest", "seconds"):
+        assert word in table
+    problem = tp.scenes.load("six-peaks")
+    field = tp.distance_field(problem.surface, (1, 2), bounds=problem.bounds, spacing=0.2)
+    with np.load(files[1]) as archive:
+        np.testing.assert_array_equal(archive["distance"], field.values)
+    assert files[2].read_bytes().startswith(b"\x89PNG")
+    assert sorted(tmp_path.iterdir()) == sorted(files)
+
+
+def test_the_field_of_a_map_starts_where_it_is_told(dem, tmp_path, capsys):
+    output = tmp_path / "f.tif"
+    asked = [str(dem), "--start", "500100,4000100", "--output", str(output)]
+    assert run(["field", *asked, "--layer", f"rocks={dem}:2*50"]) == 0
+    capsys.readouterr()
+    with rasterio.open(output) as dataset:
+        column_row = np.array(~dataset.transform * (500_100.0, 4_000_100.0))
+        values = dataset.read(1)
+    nearest = np.unravel_index(np.nanargmin(values), values.shape)
+    assert np.abs(column_row - 0.5 - nearest[::-1]).max() <= 0.5 + 1e-6
+    assert np.isnan(values).sum() > 0  # the block without data
+
+
+BAD_FIELDS = {
+    "no output": (["six-peaks"], "--output", "--plot"),
+    "unknown format": (["six-peaks", "--output", "f.csv"], "f.csv", ".tif"),
+    "unknown picture": (["six-peaks", "--plot", "f.tif"], "f.tif", ".png"),
+    "no directory": (["six-peaks", "--output", "no/f.tif"], "no/f.tif", "directory"),
+    "same file twice": (["six-peaks", "--output", "f.tif", "--output", "f.tif"], "twice"),
+    "start off the map": (["six-peaks", "--start", "20,3", "--output", "f.tif"], "start=(20, 3)"),
+    "no spacing": (["six-peaks", "--spacing", "0", "--output", "f.tif"], "spacing=0"),
+    "NaN spacing": (["six-peaks", "--spacing", "nan", "--output", "f.tif"], "spacing=nan"),
+    "too many nodes": (["six-peaks", "--spacing", "1e-9", "--output", "f.tif"], "wider"),
+    "a goal": (["six-peaks", "--goal", "1,1", "--output", "f.tif"], "--goal"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FIELDS)
+def test_bad_questions_about_a_field_give_one_clear_line(name, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments, *words = BAD_FIELDS[name]
+    refused(capsys, "field", arguments, *words)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_scenes_lists_every_scene(capsys):
     assert run(["scenes"]) == 0
     listed = capsys.readouterr().out
@@ -339,7 +581,8 @@ def test_help_and_version_need_no_heavy_import():
         "from terrapath.cli.main import run\n"
         "assert run(['--version']) == 0\n"
         "assert run(['--help']) == 0\n"
-        "assert run(['plan', '--help']) == 0\n"
+        "for command in ('plan', 'check', 'field'):\n"
+        "    assert run([command, '--help']) == 0\n"
         "heavy = {'numba', 'numpy', 'scipy', 'matplotlib', 'rasterio', 'shapely', 'sympy'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
     )

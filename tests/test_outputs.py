@@ -6,7 +6,9 @@ import shutil
 
 import numpy as np
 import pytest
+import rasterio
 import shapely
+from pyproj import CRS, Transformer
 
 import terrapath as tp
 from terrapath.files import require_writable, written_whole
@@ -31,6 +33,111 @@ def test_geojson_without_crs_keeps_the_plane(tmp_path):
     feature = json.loads((tmp_path / "route.geojson").read_text())["features"][0]
     assert feature["geometry"]["coordinates"] == solution.path.points.tolist()
     assert "without CRS" in feature["properties"]["coordinates"]
+
+
+@pytest.fixture(scope="module")
+def finished():
+    problem = tp.scenes.load("one-peak")
+    return tp.plan(problem, samples=300, refine=True, bound=True)
+
+
+def test_records_tell_the_bound_and_the_planners_own_length(finished, tmp_path):
+    for suffix in (".json", ".geojson"):
+        tp.write_route(finished, tmp_path / f"route{suffix}")
+    record = json.loads((tmp_path / "route.json").read_text())
+    (feature,) = json.loads((tmp_path / "route.geojson").read_text())["features"]
+    for found in (record, feature["properties"]):
+        assert found["length"] == finished.length
+        assert found["unrefined_length"] == finished.unrefined.length > finished.length
+        assert found["lower_bound"] == finished.lower_bound
+        assert found["gap"] == finished.gap
+    assert feature["geometry"]["coordinates"] == finished.path.points.tolist()
+
+
+def test_what_was_not_asked_for_is_null_in_records(solution, tmp_path):
+    tp.write_route(solution, tmp_path / "route.geojson")
+    (feature,) = json.loads((tmp_path / "route.geojson").read_text())["features"]
+    for key in ("unrefined_length", "lower_bound", "gap"):
+        assert feature["properties"][key] is None
+
+
+# Distance fields
+
+
+@pytest.fixture(scope="module")
+def walled():
+    """A field whose goal's side is walled off, on nodes 0.25 apart."""
+    surface = tp.scenes.load("one-peak").surface
+    wall = shapely.LineString([(7, -1), (7, 11)])
+    return tp.distance_field(
+        surface, (1, 2), bounds=(-1, -1, 11, 9), obstacles=[wall], spacing=0.25
+    )
+
+
+def test_a_field_comes_back_from_a_geotiff_as_it_was(walled, tmp_path):
+    tp.write_field(walled, tmp_path / "field.tif")
+    with rasterio.open(tmp_path / "field.tif") as dataset:
+        values = dataset.read(1)
+        rows, columns = np.indices(values.shape)
+        x, y = dataset.transform * (columns + 0.5, rows + 0.5)
+        assert dataset.crs is None
+        assert dataset.descriptions == ("distance",)
+        assert np.isnan(dataset.nodata)
+        assert dataset.profile["compress"] == "deflate"
+        assert dataset.tags()["source_x1"] == "1.0"
+    lattice = walled.lattice
+    expected = np.broadcast_to(lattice.x, values.shape)
+    np.testing.assert_allclose(x, expected, atol=1e-12)
+    np.testing.assert_allclose(y, np.broadcast_to(lattice.y[::-1, None], values.shape), atol=1e-12)
+    np.testing.assert_array_equal(np.isnan(values), np.isinf(walled.values[::-1]))
+    np.testing.assert_array_equal(np.nan_to_num(values, nan=np.inf), walled.values[::-1])
+    assert np.isnan(values[x > 7]).all()
+    assert np.isfinite(values[x < 6.9]).all()
+    assert [path.name for path in tmp_path.iterdir()] == ["field.tif"]
+
+
+def test_a_field_comes_back_from_an_archive_as_it_was(walled, tmp_path):
+    tp.write_field(walled, tmp_path / "field.npz")
+    with np.load(tmp_path / "field.npz") as archive:
+        np.testing.assert_array_equal(archive["distance"], walled.values)
+        np.testing.assert_array_equal(archive["x"], walled.lattice.x)
+        np.testing.assert_array_equal(archive["y"], walled.lattice.y)
+        assert archive["source"].tolist() == [1.0, 2.0]
+        assert str(archive["crs"]) == ""
+
+
+def test_a_field_on_a_map_is_read_back_in_its_place(tmp_path):
+    problem = tp.scenes.load("jacksboro")
+    surface = problem.surface
+    field = tp.distance_field(surface, problem.start, spacing=500.0)
+    tp.write_field(field, tmp_path / "field.tif")
+    with rasterio.open(tmp_path / "field.tif") as dataset:
+        assert dataset.units == ("m",)
+        assert dataset.descriptions == ("distance (m)",)
+        found = next(dataset.sample([problem.goal])).item()
+        crs = CRS.from_wkt(dataset.crs.to_wkt())
+    assert found == pytest.approx(float(field.at(problem.goal)), abs=1000.0)
+    there = Transformer.from_crs(crs, "EPSG:4326", always_xy=True).transform(*problem.goal)
+    assert there == pytest.approx(tp.scenes.JACKSBORO_GOAL, abs=1e-7)
+    # Its heights are distances: the file is a map again.
+    again = tp.read_surface(tmp_path / "field.tif")
+    assert again.georeference.is_map_crs
+
+
+def test_a_failure_while_a_field_is_written_leaves_nothing(walled, tmp_path, monkeypatch):
+    with pytest.raises(tp.MapError, match=r"field.csv.*\.tif"):
+        tp.write_field(walled, tmp_path / "field.csv")
+
+    def fail(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", fail)
+    with pytest.raises(tp.MapError, match="No space left"):
+        tp.write_field(walled, tmp_path / "field.tif")
+    assert list(tmp_path.iterdir()) == []
+
+
+# Routes again
 
 
 def test_csv_is_the_profile(solution, tmp_path):

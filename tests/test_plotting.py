@@ -1,13 +1,16 @@
 """Pictures: that they show what they should, by asking the figure and by counting pixels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 from matplotlib.colors import to_rgb
+from matplotlib.contour import QuadContourSet
 from matplotlib.image import imread
 
 import terrapath as tp
-from terrapath.plotting import draw_route, plot_route
+from terrapath.plotting import draw_field, draw_route, plot_field, plot_route
 from terrapath.plotting.map_view import PATH_COLOUR
 from terrapath.plotting.perspective import _is_hidden, _view_direction
 from terrapath.plotting.terrain import Terrain
@@ -52,6 +55,64 @@ def test_the_title_tells_length_and_samples(solution):
     title = draw_route(solution).get_suptitle()
     assert f"{solution.length:.4f}" in title
     assert "2,000 samples" in title
+
+
+def test_the_title_tells_the_bound_and_that_a_path_is_refined(solution, problem):
+    assert "\n" not in draw_route(solution).get_suptitle()
+    refined = tp.Path(problem.surface, solution.path.points[::2])
+    proven = replace(solution, path=refined, unrefined=solution.path, lower_bound=16.9)
+    title = draw_route(proven).get_suptitle()
+    assert "rrt-star-r, refined, length" in title
+    assert f"no path is shorter than 16.9000, a gap of {100 * proven.gap:.3g} %" in title
+
+
+def test_other_routes_are_drawn_thinner_and_dashed_with_their_lengths(problem):
+    paths = [problem.path([(0, 0), (bow, 10 - bow), (10, 10)]) for bow in (3, 2, 6.5)]
+    solution = replace(
+        tp.RRT().solve(problem), path=paths[0], alternatives=tuple(paths[1:]), tree=None
+    )
+    axes = draw_route(solution).axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    for path in paths[1:]:
+        line = lines[f"next best, {path.length:.4f}"]
+        np.testing.assert_array_equal(line.get_xydata(), path.points)
+        assert line.get_linewidth() < lines["route"].get_linewidth()
+        assert line.is_dashed()
+    shown = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert set(shown) == set(lines)
+
+
+# Distance fields
+
+
+@pytest.fixture(scope="module")
+def field(problem):
+    obstacles = [shapely.Point(5, 5).buffer(2).exterior, tp.Circle(9, 7, 0.8)]
+    return tp.distance_field(
+        problem.surface, (0, 0), bounds=problem.bounds, obstacles=obstacles, spacing=0.1
+    )
+
+
+def test_a_field_is_drawn_with_lines_of_equal_distance_and_hatches(field, tmp_path):
+    axes = draw_field(field).axes[0]
+    lines, hatched = (
+        [c for c in axes.collections if isinstance(c, QuadContourSet) and c.filled == filled]
+        for filled in (False, True)
+    )
+    assert len(lines) == len(hatched) == 1
+    assert hatched[0].hatches == ["////"]
+    for level, path in zip(lines[0].levels, lines[0].get_paths(), strict=True):
+        for point in path.vertices[::40]:
+            assert float(field.at(point)) == pytest.approx(level, abs=0.2)
+    plot_field(field, tmp_path / "field.png")
+    assert imread(tmp_path / "field.png").shape[0] > 500
+
+
+def test_the_field_of_flat_ground_without_obstacles_is_drawn():
+    flat = tp.Surface.from_peaks([[(0, 1, 0, 0)]])
+    field = tp.distance_field(flat, (0, 0), bounds=(-1, -1, 2, 2), spacing=0.1)
+    title = draw_field(field).get_suptitle()
+    assert title == f"distance from (0, 0), at most {field.values.max():.4f}"
 
 
 def test_a_search_without_a_path_is_drawn_too(problem, tmp_path):

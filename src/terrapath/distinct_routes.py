@@ -95,7 +95,7 @@ def _candidates(
 def _away_from(path: Path, points: Array, radius: float) -> Array:
     """The points (m, 2) that are farther than a radius from a path."""
     near = np.asarray(shapely.dwithin(path.line, shapely.points(points), radius))
-    return points[~near]
+    return np.asarray(points[~near])
 
 
 def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:

@@ -36,6 +36,9 @@ CHUNK = 100_000
 # Steps of a path back to the source, in nodes.
 STEP = 0.5
 
+# Nodes ahead that a path from node to node may be cut short to.
+LOOK_AHEAD = 100
+
 # Vectors of stencils are kept in 16 bits.
 LONGEST_SIDE = 2**15 - 1
 
@@ -215,7 +218,8 @@ class Medium:
                 self.nodes, front, self.readers, source, self.lattice.nx, CHUNK, float(limit)
             )
             settled += chunk
-            if chunk < CHUNK or (watch is not None and watch(settled)):
+            stop = watch is not None and watch(settled)
+            if stop or chunk < CHUNK:
                 return
 
 
@@ -351,7 +355,25 @@ class DistanceField:
         nx = self.lattice.nx
         points = np.column_stack([self.lattice.x[numbers % nx], self.lattice.y[numbers // nx]])
         points = np.concatenate([goal[None], points, [self.source]])
-        return points if self._is_free(points) else None
+        return self._shortened(points) if self._is_free(points) else None
+
+    def _shortened(self, points: Array) -> Array:
+        """A path from node to node with its corners cut, as far as that is free and shorter.
+
+        The few directions that links have make such a path a staircase.
+        """
+        lengths = metric.segment_lengths(self.surface, points[:-1], points[1:])
+        reached = np.concatenate([[0.0], np.cumsum(lengths)])
+        kept = [0]
+        while kept[-1] < len(points) - 1:
+            here = kept[-1]
+            ahead = np.arange(here + 1, min(here + LOOK_AHEAD, len(points) - 1) + 1)
+            starts = np.broadcast_to(points[here], (len(ahead), 2))
+            free = self.free_space.segments_are_free(starts, points[ahead])
+            direct = metric.segment_lengths(self.surface, starts, points[ahead])
+            good = free & (direct <= (reached[ahead] - reached[here]) * (1.0 + 1e-12))
+            kept.append(int(ahead[good][-1]) if good.any() else here + 1)
+        return points[kept]
 
     @cached_property
     def reached(self) -> float:
