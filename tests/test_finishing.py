@@ -207,7 +207,7 @@ def test_ctrl_c_while_optimal_looks_for_routes(stage, problem, monkeypatch):
     assert solution.lower_bound is None
     assert (solution.path is None) == (stage == "march_from")
     if solution.path is not None:
-        assert solution.length == pytest.approx(TRUTH, rel=1e-3)
+        assert solution.length == pytest.approx(TRUTH, rel=1e-2)  # unrefined
 
 
 def test_ctrl_c_while_optimal_proves_keeps_the_routes(problem, monkeypatch):
@@ -223,7 +223,7 @@ def test_optimal_keeps_fast_marchings_path_where_no_route_can_be_refined(problem
     monkeypatch.setattr(optimal, "routes_of_fields", fail)
     with pytest.warns(UnfinishedWarning, match="ArithmeticError: by zero"):
         solution = tp.Optimal(target_gap=0.1).solve(problem)
-    assert solution.length == pytest.approx(TRUTH, rel=1e-3)
+    assert solution.length == pytest.approx(TRUTH, rel=1e-2)  # unrefined
     assert solution.gap <= 0.1
 
 

@@ -13,9 +13,9 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from . import geodesics, metric, scenes
-    from .distinct_routes import alternatives
     from .bounding import lower_bound
     from .certificate import Certificate
+    from .distinct_routes import alternatives
     from .eikonal import DistanceField, distance_field
     from .errors import (
         CertificateError,

@@ -40,7 +40,7 @@ def alternatives(
     """The distinct locally shortest routes from start to goal, each refined, shortest first.
 
     count : at most so many. spacing : of the nodes that routes are searched on, map units; by
-    default a 250th of the region's longer side.
+    default a 250th of the region's longer side, or a cell of a finer map.
     A route is led through a node off the routes found before, where the sum of the distances
     from start and goal is least. Empty where no route was found on the nodes.
     """
@@ -49,7 +49,8 @@ def alternatives(
         require_positive(spacing=spacing)
     if problem.start == problem.goal:
         return (problem.path([problem.start, problem.goal]),)
-    lattice = Lattice.spanning(problem.bounds, spacing or default_spacing(problem.bounds))
+    chosen = spacing or default_spacing(problem.bounds, problem.surface.resolution)
+    lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
     fields = [
         march_from(problem.surface, problem.free_space, end, medium)

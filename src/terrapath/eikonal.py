@@ -425,12 +425,13 @@ def distance_field(
     """Distances on the surface from a start to everywhere, by fast marching.
 
     start : (x1, x2), map units, in free space. bounds, obstacles : as of ``Problem``.
-    spacing : of the nodes, map units; by default a 250th of the region's longer side.
+    spacing : of the nodes, map units; by default a 250th of the region's
+    longer side, or a cell of a finer map.
     watch : now and then called with the number of settled nodes; returning True stops.
     Raises OutsideSurfaceError or InputError, naming the value and the remedy.
     """
     problem = Problem(surface, start, start, bounds, obstacles)
-    chosen = default_spacing(problem.bounds) if spacing is None else spacing
+    chosen = default_spacing(problem.bounds, surface.resolution) if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(surface, lattice, problem.free_space)
     return march_from(surface, problem.free_space, problem.start, medium, watch=watch)

@@ -12,16 +12,18 @@ from ._kernels.free_space import Grid
 from .errors import InputError
 from .validation import Array, Bounds, require_positive
 
-# The default spacing of the nodes is this share of the region's longer side.
-NODES_PER_SIDE = 250.0
+# The default spacing of the nodes is this share of the region's longer side, or less where the
+# surface has finer features, but never less than the other one.
+NODES_PER_SIDE, MOST_NODES_PER_SIDE = 250.0, 1000.0
 
 # Nodes that can be numbered by 32 bits, and fit in the memory of a large machine.
 MOST_NODES = 2**30
 
 
-def default_spacing(bounds: Bounds) -> float:
-    """A spacing of nodes that suits a region, map units."""
-    return max(bounds.width, bounds.height) / NODES_PER_SIDE
+def default_spacing(bounds: Bounds, resolution: float) -> float:
+    """A spacing of nodes that suits a region with features of a resolution, map units."""
+    side = max(bounds.width, bounds.height)
+    return max(min(side / NODES_PER_SIDE, resolution), side / MOST_NODES_PER_SIDE)
 
 
 @dataclass(frozen=True)

@@ -205,7 +205,7 @@ def obtuse_superbase(d, b):
         elif dot(d, x1, y1, x2, y2) > 0.0:
             x0, y0, x1, y1 = -x1, -y1, x2, y2
         elif dot(d, x2, y2, x0, y0) > 0.0:
-            x1, y1, x0, y0 = -x2, -y2, x0, y0
+            x1, y1 = -x2, -y2
         else:
             break
     return Superbase(x0, y0, x1, y1)

@@ -20,8 +20,8 @@ HALVINGS = 2
 class FastMarching:
     """The eikonal equation of h on a lattice, and the steepest way down its solution.
 
-    spacing : of the nodes, map units; by default a 250th of the region's longer side. Where
-    no path is found, half and a quarter of it are tried.
+    spacing : of the nodes, map units; by default a 250th of the region's longer side, or a cell
+    of a finer map. Where no path is found, half and a quarter of it are tried.
 
     ``cost`` is the distance that the field gives at the goal, ``samples`` the nodes settled.
     Source: Mirebeau 2014 (stencils); Sethian 1996 (fast marching).
@@ -43,7 +43,7 @@ class FastMarching:
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
         started = time.perf_counter()
-        spacing = self.spacing or default_spacing(problem.bounds)
+        spacing = self.spacing or default_spacing(problem.bounds, problem.surface.resolution)
         settled, stopped = 0, False
         for _ in range(HALVINGS + 1):
             lattice = Lattice.spanning(problem.bounds, spacing)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from .._kernels import grid_search as kernels
 from ..errors import InputError
-from ..lattice import Lattice
+from ..lattice import Lattice, default_spacing
 from ..problem import Path, Problem, Solution, Status
 from ..validation import Array, require_count, require_positive
 from .base import Callback, Progress, answer_without_search
@@ -19,9 +19,6 @@ from .tree_search import FEATURES_PER_PANEL
 
 # Vertices settled between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 4096
-
-# The default spacing is this share of the region's longer side.
-NODES_PER_SIDE = 250.0
 
 # How many columns or rows away the farthest of so many neighbours is.
 REACH = {8: 1, 16: 2, 32: 3}
@@ -40,7 +37,8 @@ NO_NODES = np.array([0, -1, 0, -1])
 class Dijkstra:
     """The shortest path through the nodes of a grid, by Dijkstra's algorithm (1959).
 
-    spacing : of the nodes, map units; by default a 250th of the region's longer side.
+    spacing : of the nodes, map units; by default a 250th of the region's
+    longer side, or a cell of a finer map.
     neighbours : of a node: 8; 16, with the knight's moves; or 32, with those to (1, 3) and
         (2, 3) too. However fine the grid, paths on level ground are up to 8.2 %, 2.7 % and
         1.3 % longer than the straight line, because they can take so few directions.
@@ -96,11 +94,6 @@ class AStar(Dijkstra):
     def informed(self) -> bool:
         """Is the search drawn towards the goal?"""
         return True
-
-
-def default_spacing(problem: Problem) -> float:
-    """A spacing that suits the region, map units."""
-    return max(problem.bounds.width, problem.bounds.height) / NODES_PER_SIDE
 
 
 def _offsets(neighbours: int) -> Integers:
@@ -195,7 +188,10 @@ def _allocate(lattice: Lattice, layers: int) -> kernels.Graph:
 
 def _prepare(problem: Problem, planner: Dijkstra) -> _Search:
     """Open the start, and have the kernels loaded, or compiled, before the clock starts."""
-    lattice = Lattice.spanning(problem.bounds, planner.spacing or default_spacing(problem))
+    lattice = Lattice.spanning(
+        problem.bounds,
+        planner.spacing or default_spacing(problem.bounds, problem.surface.resolution),
+    )
     nodes = kernels.Nodes(
         x=lattice.x,
         y=lattice.y,

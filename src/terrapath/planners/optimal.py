@@ -103,7 +103,9 @@ class _Run:
     def find_routes(self) -> None:
         """The locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
-        spacing = self.planner.spacing or default_spacing(problem.bounds)
+        spacing = self.planner.spacing or default_spacing(
+            problem.bounds, problem.surface.resolution
+        )
         for _ in range(HALVINGS + 1):
             lattice = Lattice.spanning(problem.bounds, spacing)
             self.total = self.samples + 2 * lattice.nx * lattice.ny
