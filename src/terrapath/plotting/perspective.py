@@ -19,6 +19,7 @@ SAMPLES = 180
 ELEVATION, AZIMUTH = 42.0, -115.0  # degrees: where the viewer stands
 RELIEF = 0.26  # height of the drawn box, as a share of its longer side
 SIGHT_STEPS = 240
+PATH_POINTS = 1500
 
 
 def _view_direction(box: Array, spread: Array) -> Array:
@@ -56,6 +57,8 @@ def _draw_path(axes: Any, solution: Solution, terrain: Terrain, box: Array, spre
     profile = solution.path.profile
     lift = 0.008 * float(spread[2])
     lifted = np.column_stack([profile.points, profile.values[:, 0] + lift])
+    # Finer than this no eye sees, and every point is asked whether it is hidden.
+    lifted = lifted[np.linspace(0, len(lifted) - 1, min(len(lifted), PATH_POINTS)).astype(int)]
     hidden = _is_hidden(terrain, lifted, _view_direction(box, spread), lift)
     shown, behind = lifted.copy(), lifted.copy()
     shown[hidden] = np.nan

@@ -52,7 +52,7 @@ class MarchRuns:
 class Marched:
     """What a fresh process measured."""
 
-    medium: Timing  # stencils and readers
+    stencils: Timing
     readers: Timing
     march: Timing
     peer: Timing | None  # scikit-fmm, isotropic, second order
@@ -63,7 +63,7 @@ class Marched:
     @property
     def whole(self) -> Timing:
         """From the surface to the distance field."""
-        return self.medium + self.march
+        return self.stencils + self.readers + self.march
 
     @property
     def ratio(self) -> float | None:

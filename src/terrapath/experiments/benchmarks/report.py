@@ -62,8 +62,9 @@ def bound_lines(data: BoundData) -> list[str]:
     wanted = ", ".join(f"{percent(gap)} in {limit:g} s" for gap, limit in GAP_TARGETS)
     return [
         "The best certificate so far each time a lattice is done, and how long after the start "
-        "that was. The true length is told to the search; gaps are over the bound. Lattices "
-        f"are those that the certificate lies on. Targets: {wanted}. `check` proves a "
+        "that was. The true length is told to the search; gaps are over the bound. Nodes are those "
+        "that the certificate lies on: where they repeat, the finer lattice proved no more. "
+        f"Targets: {wanted}. `check` proves a "
         "certificate again from nothing but the problem.",
         "",
         *_table(header, rows),
@@ -73,12 +74,10 @@ def bound_lines(data: BoundData) -> list[str]:
 def _marching_row(row: MarchRow) -> list[str]:
     found = row.found
     reference = REFERENCE_ERRORS.get((row.scene, row.nodes))
-    stencils = found.medium.seconds - found.readers.seconds
     return [
         row.scene,
         f"{row.nodes:,}",
-        f"{stencils:.3f}",
-        *(_seconds(timing) for timing in (found.readers, found.march, found.whole)),
+        *map(_seconds, (found.stencils, found.readers, found.march, found.whole)),
         NOTHING if found.peer is None else _seconds(found.peer),
         NOTHING if found.ratio is None else f"{found.ratio:.2f}",
         _signed(row.error),
