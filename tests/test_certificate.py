@@ -22,7 +22,7 @@ import certificate_oracles as oracles
 import planner_oracles
 import terrapath as tp
 from processes import in_another_process
-from terrapath import bounding, certificate, scenes
+from terrapath import certificate, scenes
 from terrapath._kernels import certificate as kernels
 from terrapath.bounding import Search, search_window
 from terrapath.certificate import Core, seal_of
@@ -259,7 +259,7 @@ def random_box(random, bound, surface):
     rows, columns = bound.coefficients.shape
     i, j = int(random.integers(0, columns - 3)), int(random.integers(0, rows - 3))
     low = np.array([i * bound.dx, j * bound.dy])
-    high = low + (bound.dx, bound.dy)
+    high = (*low, bound.dx, bound.dy)
     place = random.uniform(low, high)
     data = surface.data
     if hasattr(data, "dx"):
@@ -1101,7 +1101,7 @@ def test_files_with_a_flipped_bit_are_not_believed(small, tmp_path):
         try:
             found = tp.Certificate.load(path)
         except tp.MapError as error:
-            assert "\n" not in str(error)
+            assert "\n" not in str(error)  # noqa: PT017
             continue
         try:
             assert found.check(problem) == made.value

@@ -37,7 +37,7 @@ def starting_curves():
     """Bows to either side and S-shapes, from the straight line to the region's corners."""
     t = np.linspace(0.0, 1.0, 40)[:, None]
     line, across = t * GOAL, np.array([-1.0, 1.0]) / np.sqrt(2.0)
-    for bow in np.linspace(-6.3, 6.3, 7):
+    for bow in np.linspace(-6.3, 6.3, 5):
         yield line + bow * np.sin(np.pi * t) * across
     for bow in (-3.0, 3.0):
         yield line + bow * np.sin(2.0 * np.pi * t) * across

@@ -195,7 +195,7 @@ def _hash(*parts: Any) -> str:
             digest.update(f"{len(part)};{part}".encode())
         else:
             digest.update(f"{np.shape(part)};".encode())
-            digest.update(np.ascontiguousarray(part, dtype=np.float64))
+            digest.update(np.ascontiguousarray(part, dtype=np.float64).tobytes())
     return digest.hexdigest()
 
 

@@ -41,6 +41,8 @@ class Lattice:
         Raises InputError where that is more nodes than can be numbered.
         """
         require_positive(spacing=spacing)
+        if max(bounds.width, bounds.height) / spacing > MOST_NODES:
+            raise InputError(f"spacing={spacing:g} makes more than {MOST_NODES:,} nodes; widen it")
         nx = max(math.ceil(bounds.width / spacing - 1e-9), 1) + 1
         ny = max(math.ceil(bounds.height / spacing - 1e-9), 1) + 1
         if nx * ny > MOST_NODES:

@@ -17,8 +17,8 @@ from .free_space import FreeSpace, Obstacle
 from .surface import Surface
 from .validation import Array, Bounds, as_bounds, as_point
 
-# Points a segment is cut into to add up climb and draw profiles, unless the surface is finer.
-PROFILE_POINTS = 16
+# Points a path is cut into to add up climb and draw profiles, unless the surface is finer.
+PROFILE_POINTS = 256
 
 
 class Problem:
@@ -120,9 +120,9 @@ class Path:
     def profile(self) -> Profile:
         """The path sampled finely enough to see every feature of the surface."""
         pieces = [self.points[:1]]
+        finest = min(0.25 * self.surface.resolution, self.line.length / PROFILE_POINTS)
         for a, b in zip(self.points[:-1], self.points[1:], strict=True):
-            finest = np.hypot(*(b - a)) / self.surface.resolution
-            count = max(PROFILE_POINTS, int(np.ceil(4.0 * finest)))
+            count = max(int(np.ceil(np.hypot(*(b - a)) / finest)), 1) if finest > 0.0 else 1
             pieces.append(a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a))
         points = np.concatenate(pieces)
         steps = metric.segment_lengths(self.surface, points[:-1], points[1:])

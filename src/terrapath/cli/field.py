@@ -57,7 +57,9 @@ def field_command(
     spacing: Annotated[
         float | None,
         typer.Option(
-            metavar="D", help="Of the nodes, map units [default: a 250th of the longer side]."
+            metavar="D",
+            help="Of the nodes, map units [default: a 250th of the region's longer side, or a cell "
+            "of a finer map].",
         ),
     ] = None,
     height_band: HeightBand = None,

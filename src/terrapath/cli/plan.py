@@ -160,7 +160,7 @@ def plan_command(
         typer.Option(
             metavar="D",
             help="Of the nodes of dijkstra, a-star, fast-marching and optimal, map units "
-            "[default: a 250th of the region's longer side].",
+            "[default: a 250th of the region's longer side, or a cell of a finer map].",
         ),
     ] = None,
     neighbours: Annotated[

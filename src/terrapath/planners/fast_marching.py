@@ -84,7 +84,7 @@ class FastMarching:
     def _without_path(
         self, problem: Problem, started: float, settled: int, status: Status
     ) -> Solution:
-        reason = "interrupted" if status is Status.INTERRUPTED else "no way between the nodes"
+        reason = "interrupt" if status is Status.INTERRUPTED else "no way between the nodes"
         return Solution(
             problem=problem,
             planner=self.name,
