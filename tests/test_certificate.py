@@ -259,7 +259,7 @@ def random_box(random, bound, surface):
     rows, columns = bound.coefficients.shape
     i, j = int(random.integers(0, columns - 3)), int(random.integers(0, rows - 3))
     low = np.array([i * bound.dx, j * bound.dy])
-    high = low + (bound.dx, bound.dy)
+    high = low + np.array([bound.dx, bound.dy])
     place = random.uniform(low, high)
     data = surface.data
     if hasattr(data, "dx"):

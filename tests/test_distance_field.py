@@ -79,7 +79,7 @@ def upwind_solution(pairs):
 
 
 def is_smooth(trial, near, far):
-    return far < near and abs(trial - near - (near - far)) <= 0.5 * (trial - near)
+    return far < near and near - far <= 2.0 * (trial - near)
 
 
 class HeapMarch:

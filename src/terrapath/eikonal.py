@@ -12,19 +12,21 @@ import numpy as np
 import numpy.typing as npt
 
 from . import metric
+from ._kernels import descent, stencils
 from ._kernels import eikonal as kernels
-from .errors import InputError
+from ._kernels.metric_rows import ROWS, columns_of
+from .errors import InputError, OutsideSurfaceError
 from .free_space import FreeSpace, Obstacle
 from .lattice import Lattice, default_spacing
 from .problem import Path, Problem
 from .surface import Surface
-from .validation import Array, as_array, as_points
+from .validation import Array, as_array, as_point, as_points
 
 # Nodes this near to the source, in nodes, take the source model's value.
 SEED_RADIUS = 3.0
 # Differences are factored by the source model this far around the source, in nodes, or as far
 # as the surface has one feature, for the model knows no more.
-WINDOW_RADIUS = 20
+WINDOW_RADIUS = 16
 
 # A bucket of the queue is this share of a node's spacing, over the nodes of a side.
 BUCKET_SHARE = 4.0
@@ -36,11 +38,10 @@ CHUNK = 100_000
 # Steps of a path back to the source, in nodes.
 STEP = 0.5
 
-# Nodes ahead that a path from node to node may be cut short to.
-LOOK_AHEAD = 100
-
 # Vectors of stencils are kept in 16 bits.
 LONGEST_SIDE = 2**15 - 1
+# Each is read by 6 + 8 others at most on average, and these are numbered by 31 bits.
+MOST_NODES = (2**31 - 1) // 14
 
 Nodes = npt.NDArray[np.int64]
 # Sees how many nodes are settled; returning True stops the march.
@@ -134,24 +135,22 @@ class Medium:
         cls, surface: Surface, lattice: Lattice, free_space: FreeSpace | None = None
     ) -> Medium:
         """The metric h of a surface; no link between nodes touches an obstacle."""
-        nodes = _allocate(lattice)
-        kernels.lay_surface_stencils(surface.data, lattice.data, nodes)
+        nodes = _lay(surface, lattice)
         if free_space is not None and free_space.has_obstacles:
-            kernels.cut_links(free_space.data, lattice.data, nodes)
+            stencils.cut_links(free_space.data, lattice.data, nodes)
         return cls(lattice, nodes)
 
     @classmethod
     def around(cls, surface: Surface, lattice: Lattice, blocked: npt.NDArray[np.bool_]) -> Medium:
         """The metric h of a surface; only the ``blocked`` nodes (ny, nx) are left out."""
-        nodes = _allocate(lattice)
-        kernels.lay_surface_stencils(surface.data, lattice.data, nodes)
+        nodes = _lay(surface, lattice)
         if blocked.any():
-            kernels.block_nodes(lattice.data, blocked.ravel().astype(np.uint8), nodes)
+            stencils.block_nodes(lattice.data, blocked.ravel().astype(np.uint8), nodes)
         return cls(lattice, nodes)
 
     def shrink(self, factors: Array) -> None:
         """Multiply lengths at the nodes by factors (ny, nx), for good."""
-        kernels.shrink_metric(self.nodes, np.ascontiguousarray(factors, np.float64).ravel())
+        stencils.shrink_metric(self.nodes, np.ascontiguousarray(factors, np.float64).ravel())
 
     @classmethod
     def of_tensors(cls, tensors: Any, lattice: Lattice) -> Medium:
@@ -160,17 +159,15 @@ class Medium:
         if not (given[..., 0] * given[..., 2] > given[..., 1] ** 2).all():
             raise InputError("tensors hold one that is not positive definite; check their order")
         nodes = _allocate(lattice)
-        kernels.lay_tensor_stencils(given, lattice.data, nodes)
+        stencils.lay_tensor_stencils(given, lattice.data, nodes)
         return cls(lattice, nodes)
 
-    def _readers(self) -> kernels.Readers:
-        first = np.zeros(len(self.nodes) + 1, np.int64)
-        kernels.count_readers(self.nodes, self.lattice.nx, first)
-        np.cumsum(first, out=first)
+    def _readers(self) -> stencils.Readers:
+        first = np.zeros(len(self.nodes) + 1, np.int32)
+        stencils.count_readers(self.nodes, self.lattice.nx, first)
         entries = np.empty(first[-1], np.uint32)
-        ends = first[:-1].astype(np.int32)
-        kernels.list_readers(self.nodes, self.lattice.nx, ends, entries)
-        return kernels.Readers(first.astype(np.int32), entries)
+        stencils.list_readers(self.nodes, self.lattice.nx, first, entries)
+        return stencils.Readers(first, entries)
 
     def march(
         self, model: SourceModel, *, limit: float = math.inf, watch: Watch | None = None
@@ -185,14 +182,14 @@ class Medium:
         rows = slice(model.row, model.row + model.values.shape[0])
         columns = slice(model.column, model.column + model.values.shape[1])
         window = self.nodes.links.reshape(lattice.ny, lattice.nx)[rows, columns]
-        window[~np.isnan(model.values)] |= kernels.WINDOW
+        window[~np.isnan(model.values)] |= stencils.WINDOW
         try:
             kernels.plant(
                 self.nodes, front, self.readers, lattice.nx, model.seeds, model.seed_values
             )
             self._settle(front, source, limit, watch)
         finally:
-            window &= ~np.uint16(kernels.WINDOW)
+            window &= ~np.uint16(stencils.WINDOW)
         return front.u.reshape(lattice.ny, lattice.nx)
 
     def _front(self, model: SourceModel) -> kernels.Front:
@@ -218,18 +215,27 @@ class Medium:
                 self.nodes, front, self.readers, source, self.lattice.nx, CHUNK, float(limit)
             )
             settled += chunk
-            stop = watch is not None and watch(settled)
-            if stop or chunk < CHUNK:
+            stopped = watch is not None and watch(settled)
+            if stopped or chunk < CHUNK:
                 return
 
 
+def _lay(surface: Surface, lattice: Lattice) -> Any:
+    """The stencils of the metric h."""
+    nodes, grid = _allocate(lattice), lattice.data
+    columns, row = columns_of(surface.data, grid), np.empty((ROWS, lattice.nx))
+    stencils.lay_surface_stencils(surface.data, grid, columns, row, nodes)
+    return nodes
+
+
 def _allocate(lattice: Lattice) -> Any:
-    if max(lattice.nx, lattice.ny) > LONGEST_SIDE:
+    sides, count = (lattice.nx, lattice.ny), lattice.nx * lattice.ny
+    if max(sides) > LONGEST_SIDE or count > MOST_NODES:
         raise InputError(
             f"the lattice has {lattice.nx:,} x {lattice.ny:,} nodes, more than {LONGEST_SIDE:,} "
-            "on a side; give a wider spacing"
+            f"on a side or {MOST_NODES:,} in all; give a wider spacing"
         )
-    return np.zeros(lattice.nx * lattice.ny, kernels.NODE).view(np.recarray)
+    return np.zeros(count, stencils.NODE).view(np.recarray)
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,127 +259,63 @@ class DistanceField:
     def at(self, points: Any) -> Array:
         """Distances from the source to points (..., 2), map units; infinite where not reached.
 
-        Cubic in smooth places; near obstacles and the source, the least of what the visible
-        nodes around offer.
+        Cubic where the field is smooth. At a kink, where shortest paths from two sides meet,
+        and near obstacles, the least distance by way of the places around that can be seen.
+        So at a node on a kink the answer is a little more, and nearer the truth, than
+        ``values``. Raises OutsideSurfaceError where a point is outside the bounds.
         """
         array = as_points(points)
         flat = np.ascontiguousarray(array.reshape(-1, 2))
+        self._require_inside(flat)
         values = np.empty(len(flat))
-        kernels.fill_interpolated(self.lattice.data, self.values, flat, values)
-        for m in np.flatnonzero(~np.isfinite(values) | self._is_near_source(flat)):
-            values[m] = self._at_visible(flat[m])[0]
+        descent.fill_distances(self.surface.data, self.free_space.data, self._field, flat, values)
+        near = np.flatnonzero(self._is_near_source(flat))
+        direct = near_distance(self.surface, self.source, flat[near])
+        seen = self._sees_source(flat[near])
+        values[near[seen]] = direct[seen]
         return values.reshape(array.shape[:-1])
+
+    @property
+    def _field(self) -> descent.Field:
+        return descent.Field(
+            self.values, self.lattice.data, *self.source, self.free_space.has_obstacles
+        )
+
+    def _require_inside(self, points: Array) -> None:
+        bounds = self.lattice.bounds
+        outside = np.flatnonzero(~bounds.contains(points))
+        if len(outside):
+            x, y = points[outside[0]]
+            raise OutsideSurfaceError(
+                f"({x:.10g}, {y:.10g}) is outside the bounds {bounds}; "
+                "check the axis order or the CRS"
+            )
 
     def _is_near_source(self, points: Array) -> npt.NDArray[np.bool_]:
         offsets = (points - np.asarray(self.source)) / (self.lattice.dx, self.lattice.dy)
         return np.asarray(np.hypot(*offsets.T) <= SEED_RADIUS)
 
-    def _around(self, point: Array) -> tuple[Nodes, Array]:
-        """Numbers and points of the settled nodes near a point that can be seen from it."""
-        lattice, reach = self.lattice, int(SEED_RADIUS)
-        column = int((point[0] - lattice.bounds.x1_min) / lattice.dx)
-        row = int((point[1] - lattice.bounds.x2_min) / lattice.dy)
-        columns = np.arange(max(column - reach, 0), min(column + reach + 2, lattice.nx))
-        rows = np.arange(max(row - reach, 0), min(row + reach + 2, lattice.ny))
-        numbers = (rows[:, None] * lattice.nx + columns).ravel()
-        numbers = numbers[np.isfinite(self.values.ravel()[numbers])]
-        points = np.column_stack(
-            [lattice.x[numbers % lattice.nx], lattice.y[numbers // lattice.nx]]
-        )
-        ends = np.broadcast_to(point, points.shape)
-        visible = self.free_space.segments_are_free(ends, points)
-        return numbers[visible], points[visible]
-
-    def _at_visible(self, point: Array) -> tuple[float, int]:
-        """The distance by way of the best visible node, and that node; -1 for the source."""
-        numbers, points = self._around(point)
-        ends = np.broadcast_to(point, points.shape)
-        best, node = math.inf, -1
-        if len(numbers):
-            lengths = self.values.ravel()[numbers] + metric.segment_lengths(
-                self.surface, points, ends
-            )
-            best, node = float(lengths.min()), int(numbers[lengths.argmin()])
-        source = np.asarray(self.source)
-        seen = self.free_space.segments_are_free(source[None], point[None])[0]
-        if seen and self._is_near_source(point[None])[0]:
-            direct = float(near_distance(self.surface, self.source, point))
-            if direct < best:
-                return direct, -1
-        return best, node
+    def _sees_source(self, points: Array) -> npt.NDArray[np.bool_]:
+        starts = np.broadcast_to(np.asarray(self.source), points.shape)
+        return self.free_space.segments_are_free(starts, points)
 
     def path_to(self, goal: Any) -> Path | None:
         """The path down the field from the source to a goal; None where there is none.
 
         Steepest descent under h where the field is smooth and the way is free; otherwise from
-        node to node.
+        place to place, each the best of those around that can be seen.
+        Raises OutsideSurfaceError where the goal is outside the bounds.
         """
-        (end,) = as_points([goal], "goal")
-        if not math.isfinite(self.at(end)):
+        end = np.array([as_point(goal, "goal")])
+        distance = float(self.at(end)[0])
+        if not math.isfinite(distance):
             return None
-        points = self._descend(end)
-        if points is None or not self._is_free(points):
-            points = self._follow_links(end)
-        return None if points is None else Path(self.surface, points[::-1].copy())
-
-    def _is_free(self, points: Array) -> bool:
-        return bool(self.free_space.segments_are_free(points[:-1], points[1:]).all())
-
-    def _descend(self, goal: Array) -> Array | None:
-        """From the goal to the source, (m, 2)."""
-        lattice = self.lattice
-        if min(lattice.nx, lattice.ny) < 4:
-            return None
-        spacing = min(lattice.dx, lattice.dy)
-        step, near = STEP * spacing, 2.0 * spacing
+        step = STEP * min(self.lattice.dx, self.lattice.dy)
         # No shortest path is longer on the plane than its length on the surface.
-        room = int(1.2 * float(self.at(goal)) / step) + 16
-        points = np.empty((room, 2))
-        points[0] = goal
-        count = kernels.trace_descent(
-            self.surface.data, lattice.data, self.values, *self.source, near, step, points
-        )
-        if count == 0:
-            return None
-        return np.concatenate([points[:count], [self.source]])
-
-    def _follow_links(self, goal: Array) -> Array | None:
-        """As ``_descend``, from node to node, in free space wherever the links are."""
-        _, node = self._at_visible(goal)
-        if node < 0:
-            return np.array([goal, self.source])
-        trail = np.empty(len(self.medium.nodes), np.int64)
-        count = kernels.trace_links(
-            self.surface.data,
-            self.lattice.data,
-            self.medium.nodes,
-            self.values.ravel(),
-            node,
-            trail,
-        )
-        numbers = trail[:count]
-        nx = self.lattice.nx
-        points = np.column_stack([self.lattice.x[numbers % nx], self.lattice.y[numbers // nx]])
-        points = np.concatenate([goal[None], points, [self.source]])
-        return self._shortened(points) if self._is_free(points) else None
-
-    def _shortened(self, points: Array) -> Array:
-        """A path from node to node with its corners cut, as far as that is free and shorter.
-
-        The few directions that links have make such a path a staircase.
-        """
-        lengths = metric.segment_lengths(self.surface, points[:-1], points[1:])
-        reached = np.concatenate([[0.0], np.cumsum(lengths)])
-        kept = [0]
-        while kept[-1] < len(points) - 1:
-            here = kept[-1]
-            ahead = np.arange(here + 1, min(here + LOOK_AHEAD, len(points) - 1) + 1)
-            starts = np.broadcast_to(points[here], (len(ahead), 2))
-            free = self.free_space.segments_are_free(starts, points[ahead])
-            direct = metric.segment_lengths(self.surface, starts, points[ahead])
-            good = free & (direct <= (reached[ahead] - reached[here]) * (1.0 + 1e-12))
-            kept.append(int(ahead[good][-1]) if good.any() else here + 1)
-        return points[kept]
+        points = np.empty((int(1.2 * distance / step) + 16, 2))
+        points[0] = end[0]
+        count = descent.trace(self.surface.data, self.free_space.data, self._field, step, points)
+        return Path(self.surface, points[:count][::-1].copy()) if count else None
 
     @cached_property
     def reached(self) -> float:
