@@ -160,7 +160,7 @@ def search_window(problem: Problem, length: float) -> Bounds:
     if not math.isfinite(length) or straight == 0.0:
         return bounds
     # An ellipse about both ends, its axes half as long as these.
-    major = max(length, straight) * (1.0 + 1e-6)
+    major = max(length / problem.surface.least_cost, straight) * (1.0 + 1e-6)
     minor = math.sqrt(major - straight) * math.sqrt(major + straight)
     cosine, sine = (x1 - x0) / straight, (y1 - y0) / straight
     least = SMALLEST_WINDOW * max(bounds.width, bounds.height)

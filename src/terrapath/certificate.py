@@ -365,6 +365,7 @@ def edge_margin(
 ) -> float:
     """At most chord(anchor, p) + factor u(p) for all p on the edge of a core, map units.
 
+    The chord is times the surface's least cost.
     anchor (2 + layers,) : a lifted point, the start being the origin of the plane.
     """
     return float(
@@ -391,20 +392,21 @@ def proven_value(problem: Problem, certificate: Certificate, norm: float) -> flo
     """
     surface, start, goal = _ground(problem)
     doubt = _doubt(surface)
-    straight = max(math.dist(start, goal) * (1.0 - ROUNDING) - doubt, 0.0)
+    least = problem.surface.least_cost
+    straight = max(least * (math.dist(start, goal) * (1.0 - ROUNDING) - doubt), 0.0)
     if _overlap(certificate.start_core, certificate.goal_core):
         return straight
-    detour = least_detour(problem, certificate.bounds) * (1.0 - ROUNDING)
+    detour = least * least_detour(problem, certificate.bounds) * (1.0 - ROUNDING)
     first = edge_margin(problem, certificate, certificate.start_core, start, -1.0 / norm)
     last = edge_margin(problem, certificate, certificate.goal_core, goal, 1.0 / norm)
     rest = min(last, certificate.horizon / norm)
-    within = first + rest - ROUNDING * (abs(first) + abs(rest)) - doubt
+    within = first + rest - ROUNDING * (abs(first) + abs(rest)) - least * doubt
     # No number, where something overflowed.
     return max(min(within, detour), straight) if within > straight else straight
 
 
 def least_detour(problem: Problem, window: Bounds) -> float:
-    """The least length of a path that leaves a window of the problem's bounds, map units.
+    """The least length on the plane of a path that leaves a window of the problem's bounds.
 
     It is at least as long as the planar way by a side of the window: to the goal's mirror
     image there.

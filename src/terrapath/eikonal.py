@@ -65,6 +65,7 @@ def near_distance(surface: Surface, source: tuple[float, float], points: Array) 
 
     The square of a geodesic's length is that of its chord c plus |II(c, c)|^2 / 12, II being
     the second fundamental form, here at the middle: the relative error is of fourth order.
+    A cost multiplies it by its mean along the chord, but for what bending aside saves.
     """
     offsets = points - np.asarray(source)
     middle = np.asarray(source) + 0.5 * offsets
@@ -74,11 +75,36 @@ def near_distance(surface: Surface, source: tuple[float, float], points: Array) 
         np.einsum("...i,...kij,...j->...k", offsets, surface.hessians(middle), offsets) * weights
     )
     pull = np.einsum("...k,...ki->...i", bends * weights, surface.gradients(middle))
-    inverse = metric.inverse_metric_tensor(surface, middle)
+    inverse = (
+        metric.inverse_metric_tensor(surface, middle) * surface.cost(middle)[..., None, None] ** 2
+    )
     normal = np.square(bends).sum(-1) - np.einsum("...i,...ij,...j->...", pull, inverse, pull)
     squared = np.square(chords).sum(-1)
     # On rough ground the formula knows nothing past the next bump: then it adds little.
-    return np.asarray(np.sqrt(squared + np.minimum(np.maximum(normal, 0.0) / 12.0, 0.05 * squared)))
+    squared += np.minimum(np.maximum(normal, 0.0) / 12.0, 0.05 * squared)
+    distance = np.asarray(np.sqrt(squared))
+    return distance * _mean_cost(surface, source, points, inverse) if surface.costs else distance
+
+
+def _mean_cost(
+    surface: Surface, source: tuple[float, float], points: Array, inverse: Array
+) -> Array:
+    """What the cost multiplies distances to points (..., 2) nearby by.
+
+    Simpson's mean along the chord; where the cost's logarithm has the slope g across the way,
+    bending aside saves g^2 d^2 / 24 of it. inverse (..., 2, 2) : of h in the middle, costs
+    left out.
+    """
+    offsets = points - np.asarray(source)
+    middle = np.asarray(source) + 0.5 * offsets
+    mean = (
+        surface.cost(np.asarray(source)) + 4.0 * surface.cost(middle) + surface.cost(points)
+    ) / 6
+    slope = surface.log_cost_jets(middle)[..., 1:3]
+    squared = np.einsum("...i,...ij,...j->...", offsets, np.linalg.inv(inverse), offsets)
+    steepness = np.einsum("...i,...ij,...j->...", slope, inverse, slope)
+    saved = (steepness * squared - np.square((slope * offsets).sum(-1))) / 24.0
+    return np.asarray(mean * (1.0 - np.clip(saved, 0.0, 0.05)))
 
 
 def model_source(
@@ -125,9 +151,10 @@ def _slope(distance: Callable[[Array], Array], points: Array, lattice: Lattice, 
 class Medium:
     """A metric on a lattice, laid out for fast marching from any source."""
 
-    def __init__(self, lattice: Lattice, nodes: Any) -> None:
+    def __init__(self, lattice: Lattice, nodes: Any, typical_cost: float = 1.0) -> None:
         self.lattice = lattice
         self.nodes = nodes
+        self.typical_cost = typical_cost
         self.readers = self._readers()
 
     @classmethod
@@ -138,7 +165,7 @@ class Medium:
         nodes = _lay(surface, lattice)
         if free_space is not None and free_space.has_obstacles:
             stencils.cut_links(free_space.data, lattice.data, nodes)
-        return cls(lattice, nodes)
+        return cls(lattice, nodes, surface.typical_cost)
 
     @classmethod
     def around(cls, surface: Surface, lattice: Lattice, blocked: npt.NDArray[np.bool_]) -> Medium:
@@ -146,7 +173,7 @@ class Medium:
         nodes = _lay(surface, lattice)
         if blocked.any():
             stencils.block_nodes(lattice.data, blocked.ravel().astype(np.uint8), nodes)
-        return cls(lattice, nodes)
+        return cls(lattice, nodes, surface.typical_cost)
 
     def shrink(self, factors: Array) -> None:
         """Multiply lengths at the nodes by factors (ny, nx), for good."""
@@ -195,6 +222,7 @@ class Medium:
     def _front(self, model: SourceModel) -> kernels.Front:
         lattice, count = self.lattice, len(self.nodes)
         width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
+        width *= self.typical_cost
         front = kernels.Front(
             u=np.full(count, np.inf),
             trial=np.full(count, np.inf),
@@ -312,7 +340,8 @@ class DistanceField:
             return None
         step = STEP * min(self.lattice.dx, self.lattice.dy)
         # No shortest path is longer on the plane than its length on the surface.
-        points = np.empty((int(1.2 * distance / step) + 16, 2))
+        farthest = distance / self.surface.least_cost
+        points = np.empty((int(1.2 * farthest / step) + 16, 2))
         points[0] = end[0]
         count = descent.trace(self.surface.data, self.free_space.data, self._field, step, points)
         return Path(self.surface, points[:count][::-1].copy()) if count else None

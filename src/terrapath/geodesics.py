@@ -53,14 +53,20 @@ def geodesic_acceleration(surface: Surface, points: Any, velocities: Any) -> Arr
     """x'' = -h^-1 sum_k w_k^2 grad x_k (x'^T Hess x_k x') at points with velocities, (..., 2).
 
     The geodesic equation without a single Christoffel symbol; the same as the appendix's
-    -Gamma(x', x'), against which it is tested.
+    -Gamma(x', x'), against which it is tested. The slope p of the log of a cost adds
+    -2 (p . x') x' + H(x', x') H^-1 p, H being the metric without it.
     """
     v = np.asarray(velocities, np.float64)
     gradients, hessians = surface.gradients(points), surface.hessians(points)
     bends = np.einsum("...i,...kij,...j->...k", v, hessians, v) * surface.data.weights**2
     pull = np.einsum("...k,...ki->...i", bends, gradients)
-    inverse = inverse_metric_tensor(surface, points)
-    return -np.asarray(np.einsum("...ij,...j->...i", inverse, pull))
+    squared_cost = surface.cost(points)[..., None, None] ** 2
+    inverse = squared_cost * inverse_metric_tensor(surface, points)
+    tensor = metric_tensor(surface, points) / squared_cost
+    slope = surface.log_cost_jets(points)[..., 1:3]
+    pull -= np.einsum("...i,...ij,...j->...", v, tensor, v)[..., None] * slope
+    along = 2.0 * (slope * v).sum(-1)[..., None] * v
+    return -np.asarray(np.einsum("...ij,...j->...i", inverse, pull) + along)
 
 
 @dataclass(frozen=True, eq=False)

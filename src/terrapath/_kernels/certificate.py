@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .compiler import inner_kernel, kernel, per_class
-from .surfaces import Peaks, Spline
+from .surfaces import Peaks, Spline, floor_of
 
 
 class Box(NamedTuple):
@@ -328,12 +328,12 @@ def cell_of(x, x0, dx, cells):
 
 
 @kernel
-def spline_layer(surface, layer, box):
-    rows, columns = surface.coefficients.shape[1] - 3, surface.coefficients.shape[2] - 3
-    i = cell_of(box.x, surface.x0, surface.dx, columns)
-    j = cell_of(box.y, surface.y0, surface.dy, rows)
-    f = spline_models(
-        surface.coefficients[layer],
+def spline_over(surface, coefficients, box):
+    """Models of a spline on the surface's knots over a box, and of its slopes."""
+    i = cell_of(box.x, surface.x0, surface.dx, coefficients.shape[1] - 3)
+    j = cell_of(box.y, surface.y0, surface.dy, coefficients.shape[0] - 3)
+    return spline_models(
+        coefficients,
         i,
         j,
         (box.x - surface.x0) / surface.dx - i,
@@ -343,6 +343,11 @@ def spline_layer(surface, layer, box):
         surface.dx,
         surface.dy,
     )
+
+
+@inner_kernel
+def spline_layer(surface, layer, box):
+    f = spline_over(surface, surface.coefficients[layer], box)
     w = surface.weights[layer]
     return Layer(times_number(f.value, w), times_number(f.slope_x, w), times_number(f.slope_y, w))
 
@@ -350,6 +355,37 @@ def spline_layer(surface, layer, box):
 @per_class({Peaks: peaks_layer, Spline: spline_layer})
 def layer_over(surface, layer, box):
     """Models of one layer over a box, which must lie within one knot span of a spline."""
+
+
+@kernel
+def exponential(f):
+    """The model of exp f, by its series around the constant term."""
+    t = Model(0.0, f.c10, f.c01, f.c20, f.c11, f.c02, f.c30, f.c21, f.c12, f.c03, f.r)
+    squared = times(t, t)
+    total = plus(plus(constant(1.0), t), times_number(squared, 0.5))
+    total = plus(total, times_number(times(squared, t), 1.0 / 6.0))
+    reach = spread(t)
+    rest = math.exp(reach) * (reach * reach) ** 2 / 24.0
+    total = plus(total, Model(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, rest))
+    return times_number(total, math.exp(f.c00))
+
+
+@inner_kernel
+def peaks_times_squared_cost(surface, box, f):
+    return f
+
+
+@kernel
+def spline_times_squared_cost(surface, box, f):
+    if surface.log_cost.shape[0] == 0:
+        return f
+    log_cost = spline_over(surface, surface.log_cost[0], box).value
+    return times(f, exponential(times_number(log_cost, 2.0)))
+
+
+@per_class({Peaks: peaks_times_squared_cost, Spline: spline_times_squared_cost})
+def times_squared_cost(surface, box, f):
+    """The model of c^2 f over a box, which must lie within one knot span of a spline."""
 
 
 # Pieces of a cell on which the surface is smooth
@@ -423,7 +459,7 @@ class Facts(NamedTuple):
     norm: float  # at least the square of the dual norm of du anywhere in the box
     sample: float  # its largest value at nine points, but for the remainders
     lowest: float  # at most u anywhere in the box
-    chord: float  # at most the chord from anywhere in the box to the goal
+    chord: float  # at most the chord from anywhere in the box to the goal, times the least cost
 
 
 @inner_kernel
@@ -483,10 +519,10 @@ def kept(work, row):
 def facts_of_box(surface, bound, goal, i, j, box, work):
     """Bounds over a box inside cell (i, j) and one piece of the surface.
 
-    With slopes g_k of the weighted layers, h = I + sum g_k g_k^T and
+    With slopes g_k of the weighted layers, h = c^2 H, H = I + sum g_k g_k^T and
 
-        |du|_h^2 det h = |du|^2 + sum_k (du x g_k)^2,
-        det h = 1 + sum_k |g_k|^2 + sum_{k<l} (g_k x g_l)^2.
+        c^2 |du|_h^2 det H = |du|^2 + sum_k (du x g_k)^2,
+        det H = 1 + sum_k |g_k|^2 + sum_{k<l} (g_k x g_l)^2.
 
     goal (2 + layers,) is the goal's lifted point; work (2 layers, 11).
     """
@@ -507,14 +543,16 @@ def facts_of_box(surface, bound, goal, i, j, box, work):
             bottom = plus(bottom, times(twist, twist))
         reach = spread(f.value)
         chord += outside(f.value.c00 - reach, f.value.c00 + reach, goal[2 + k]) ** 2
+    bottom = times_squared_cost(surface, box, bottom)
     middle = top.c00 / bottom.c00
     excess = minus(top, times_number(bottom, middle))
-    least = max(bottom.c00 - spread(bottom), 1.0)
+    floor = floor_of(surface)
+    least = max(bottom.c00 - spread(bottom), floor * floor)
     return Facts(
         middle + (abs(excess.c00) + spread(excess)) / least,
         largest_ratio(top, bottom),
         u.value.c00 - spread(u.value),
-        math.sqrt(chord),
+        floor * math.sqrt(chord),
     )
 
 
@@ -633,7 +671,7 @@ def norm_of_box(surface, bound, goal, horizon, i, j, box, norm, cutting):
 
 
 @kernel
-def cheap_need(bound, goal, horizon, i, j):
+def cheap_need(floor, bound, goal, horizon, i, j):
     """An M that is enough for cell (i, j), from u's coefficients and the planar distance alone."""
     lowest = math.inf
     for q in range(4):
@@ -643,7 +681,7 @@ def cheap_need(bound, goal, horizon, i, j):
         return 0.0
     half_x, half_y = 0.5 * bound.dx, 0.5 * bound.dy
     box = Box(bound.x0 + i * bound.dx + half_x, bound.y0 + j * bound.dy + half_y, half_x, half_y)
-    distance = planar_distance(box, goal)
+    distance = floor * planar_distance(box, goal)
     return (horizon - lowest) / distance if distance > 0.0 else math.inf
 
 
@@ -657,7 +695,7 @@ def fill_needs(surface, bound, goal, horizon, exempt, enough, cutting, proven, l
         for i in range(proven.shape[1]):
             proven[j, i] = 0.0
             if not exempt[j, i]:
-                proven[j, i] = cheap_need(bound, goal, horizon, i, j)
+                proven[j, i] = cheap_need(floor_of(surface), bound, goal, horizon, i, j)
             likely[j, i], slope[j, i] = proven[j, i], 0.0
             if proven[j, i] > enough:
                 need = need_of_cell(surface, bound, goal, horizon, i, j, cutting)
@@ -692,9 +730,10 @@ def least_norm(surface, bound, goal, horizon, order, needs, norm, cutting):
 def margin_of_box(surface, bound, anchor, factor, i, j, box):
     """At most chord(anchor, p) + factor u(p) for any p of a box inside cell (i, j).
 
-    The chord is convex in R^n, so that it is nowhere below its tangent at the box's centre.
+    Here the chord is times the least cost. It is convex in R^n, so that it is nowhere below its tangent at the box's centre.
     anchor (2 + layers,) is a lifted point.
     """
+    floor = floor_of(surface)
     east, north = box.x - anchor[0], box.y - anchor[1]
     squared = east * east + north * north
     for k in range(surface.weights.shape[0]):
@@ -703,13 +742,14 @@ def margin_of_box(surface, bound, anchor, factor, i, j, box):
     chord = math.sqrt(squared)
     total = times_number(bound_over(bound, i, j, box).value, factor)
     if chord > 0.0:
-        along_x, along_y = box.a * east / chord, box.b * north / chord
-        tangent = Model(chord, along_x, along_y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        along_x, along_y = floor * box.a * east / chord, floor * box.b * north / chord
+        tangent = Model(floor * chord, along_x, along_y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         total = plus(total, tangent)
         for k in range(surface.weights.shape[0]):
             value = layer_over(surface, k, box).value
             offset = minus(value, constant(value.c00))
-            total = plus(total, times_number(offset, (value.c00 - anchor[2 + k]) / chord))
+            rise = value.c00 - anchor[2 + k]
+            total = plus(total, times_number(offset, floor * rise / chord))
     margin = total.c00 - spread(total)
     # No number, where something overflowed.
     return margin if margin > -math.inf else -math.inf

@@ -14,16 +14,17 @@ from scipy.integrate import DOP853
 
 from .compiler import allocating_kernel, inner_kernel, kernel
 from .lengths import norm
-from .surfaces import Metric, jet_at
+from .surfaces import Jet, Metric, jet_at, log_cost_at, metric_at
 
 
 class Frame(NamedTuple):
-    """The metric at a point and the inner products with second derivatives.
+    """The metric at a point without its cost, and the inner products with second derivatives.
 
     Sums run over the weighted layers: a_ijl = sum_k (d_i d_j x_k) (d_l x_k).
     """
 
     h: Metric
+    log_cost: Jet
     a111: float
     a112: float
     a121: float
@@ -73,7 +74,8 @@ def frame_at(surface, x, y):
         a221 += w * jet.fyy * jet.fx
         a222 += w * jet.fyy * jet.fy
         hessians += w * (jet.fxx * jet.fyy - jet.fxy * jet.fxy)
-    return Frame(Metric(h11, h12, h22), a111, a112, a121, a122, a221, a222, hessians)
+    h, log_cost = Metric(h11, h12, h22), log_cost_at(surface, x, y)
+    return Frame(h, log_cost, a111, a112, a121, a122, a221, a222, hessians)
 
 
 @inner_kernel
@@ -105,13 +107,45 @@ def curvature(frame, g):
 
 
 @inner_kernel
+def costly_christoffel(frame, g):
+    """The symbols of c^2 h from those of h, p being log c.
+
+    Gamma^k_ij + delta^k_i p_j + delta^k_j p_i - h_ij h^kl p_l (do Carmo 1992, chapter 8).
+    """
+    h, px, py = frame.h, frame.log_cost.fx, frame.log_cost.fy
+    d = h.h11 * h.h22 - h.h12 * h.h12
+    up_x, up_y = (h.h22 * px - h.h12 * py) / d, (h.h11 * py - h.h12 * px) / d
+    return Christoffel(
+        g.g1_11 + 2.0 * px - h.h11 * up_x,
+        g.g1_12 + py - h.h12 * up_x,
+        g.g1_22 - h.h22 * up_x,
+        g.g2_11 - h.h11 * up_y,
+        g.g2_12 + px - h.h12 * up_y,
+        g.g2_22 + 2.0 * py - h.h22 * up_y,
+    )
+
+
+@inner_kernel
+def costly_curvature(frame, g):
+    """Gaussian curvature of c^2 h: (K - Laplacian of log c) / c^2."""
+    h, p = frame.h, frame.log_cost
+    pxx = p.fxx - g.g1_11 * p.fx - g.g2_11 * p.fy
+    pxy = p.fxy - g.g1_12 * p.fx - g.g2_12 * p.fy
+    pyy = p.fyy - g.g1_22 * p.fx - g.g2_22 * p.fy
+    d = h.h11 * h.h22 - h.h12 * h.h12
+    laplacian = (h.h22 * pxx - 2.0 * h.h12 * pxy + h.h11 * pyy) / d
+    return math.exp(-2.0 * p.f) * (curvature(frame, g) - laplacian)
+
+
+@inner_kernel
 def derivative(surface, s):
     """d/ds of a state: x'' = -Gamma(v, v) (paper, appendix 6.1), j'' = -K j."""
     frame = frame_at(surface, s.x, s.y)
-    g = christoffel(frame)
+    plain = christoffel(frame)
+    g = costly_christoffel(frame, plain)
     ax = -(g.g1_11 * s.vx * s.vx + 2.0 * g.g1_12 * s.vx * s.vy + g.g1_22 * s.vy * s.vy)
     ay = -(g.g2_11 * s.vx * s.vx + 2.0 * g.g2_12 * s.vx * s.vy + g.g2_22 * s.vy * s.vy)
-    return State(s.vx, s.vy, ax, ay, s.dj, -curvature(frame, g) * s.j)
+    return State(s.vx, s.vy, ax, ay, s.dj, -costly_curvature(frame, plain) * s.j)
 
 
 @inner_kernel
@@ -121,7 +155,7 @@ def unit_state(surface, x, y, angle):
     The direction u turns by |du|_h sin / |u|_h = sqrt(d) / |u|_h^2 under h for each radian on
     the plane, which is the field's first derivative.
     """
-    h = frame_at(surface, x, y).h
+    h = metric_at(surface, x, y)
     dx, dy = math.cos(angle), math.sin(angle)
     speed = norm(h, dx, dy)
     turn = math.sqrt(h.h11 * h.h22 - h.h12 * h.h12) / (speed * speed)
@@ -342,7 +376,8 @@ def trace(surface, tableau, bounds, x, y, angle, length, longest_step, unit, tol
 def fill_christoffel(surface, points, symbols):
     """Christoffel symbols (m, 2, 2, 2), index order [k, i, j]."""
     for m in range(points.shape[0]):
-        g = christoffel(frame_at(surface, points[m, 0], points[m, 1]))
+        frame = frame_at(surface, points[m, 0], points[m, 1])
+        g = costly_christoffel(frame, christoffel(frame))
         symbols[m, 0, 0, 0] = g.g1_11
         symbols[m, 0, 0, 1] = symbols[m, 0, 1, 0] = g.g1_12
         symbols[m, 0, 1, 1] = g.g1_22
@@ -356,4 +391,4 @@ def fill_curvature(surface, points, curvatures):
     """Gaussian curvatures (m,)."""
     for m in range(points.shape[0]):
         frame = frame_at(surface, points[m, 0], points[m, 1])
-        curvatures[m] = curvature(frame, christoffel(frame))
+        curvatures[m] = costly_curvature(frame, christoffel(frame))

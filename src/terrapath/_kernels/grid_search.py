@@ -68,6 +68,7 @@ class Graph(NamedTuple):
     lifted: np.ndarray  # (nx * ny + 2, layers) float64: weighted layer values
     heap: np.ndarray  # (nx * ny + 3,) ENTRY: the open vertices, four children a slot, from slot 1
     counters: np.ndarray  # (COUNTERS,) int64
+    floor: float  # no cost of the surface is below it
 
 
 class Options(NamedTuple):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from .compiler import allocating_kernel, inner_kernel, kernel
-from .surfaces import metric_at, value_at
+from .surfaces import floor_of, metric_at, value_at
 
 
 @inner_kernel
@@ -46,12 +46,15 @@ def line_r(surface, ax, ay, bx, by):
 
 @kernel
 def chord(surface, ax, ay, bx, by):
-    """Euclidean distance in R^n between the lifted points; never above the geodesic distance."""
+    """Euclidean distance in R^n between the lifted points, times the least cost.
+
+    Never above the geodesic distance.
+    """
     total = (bx - ax) * (bx - ax) + (by - ay) * (by - ay)
     for layer in range(surface.weights.shape[0]):
         rise = value_at(surface, layer, bx, by) - value_at(surface, layer, ax, ay)
         total += (surface.weights[layer] * rise) ** 2
-    return math.sqrt(total)
+    return floor_of(surface) * math.sqrt(total)
 
 
 def _symmetric(half, sign):

@@ -101,6 +101,20 @@ def fill_spline_slopes(columns, fx, fy):
 
 
 @kernel
+def multiply_by_cost(columns, row):
+    """Multiply the metric of a row by c^2, from the sums along x2 of log c."""
+    values = columns[9]
+    for i in range(row.shape[1]):
+        c, log_cost = int(columns[8, i]), 0.0
+        for k in range(4):
+            log_cost += columns[k, i] * values[c + k]
+        c2 = math.exp(2.0 * log_cost)
+        row[H11, i] *= c2
+        row[H12, i] *= c2
+        row[H22, i] *= c2
+
+
+@kernel
 def fill_spline_row(surface, grid, j, columns, row):
     cell = spline_cell(surface, surface.x0, grid.y0 + j * grid.dy)
     by, sy = basis(cell.v), basis_slope(cell.v)
@@ -111,6 +125,9 @@ def fill_spline_row(surface, grid, j, columns, row):
         sum_columns(surface.coefficients[layer], cell.j, sy, columns[10])
         fill_spline_slopes(columns, row[FX], row[FY])
         add_layer(row, surface.weights[layer] * surface.weights[layer])
+    if surface.log_cost.shape[0] > 0:
+        sum_columns(surface.log_cost[0], cell.j, by, columns[9])
+        multiply_by_cost(columns, row)
 
 
 @per_class({Peaks: peaks_columns, Spline: spline_columns})

@@ -1,7 +1,8 @@
 """Newton's method for polylines of least energy, and what a moving polyline runs into.
 
-The energy of a polyline is its number of pieces times the sum of its squared chords in R^n.
-Least energy makes the chords equal and their sum, whose square the energy then is, least.
+The energy of a polyline is its number of pieces times the sum of its squared chords in R^n,
+each times the mean of the squared cost C = c^2 at its ends. Least energy makes the pieces equally
+long and their sum, whose square the energy then is, least.
 """
 
 import math
@@ -49,12 +50,23 @@ def entry(blocks, i):
     return Block(blocks[i, 0, 0], blocks[i, 0, 1], blocks[i, 1, 0], blocks[i, 1, 1])
 
 
+class Strand(NamedTuple):
+    """The inner points of a polyline (m,) and its pieces (m + 1,)."""
+
+    jets: np.ndarray  # (m, layers, 6): value, gradient and second derivatives of each layer
+    weights: np.ndarray  # (layers,)
+    costs: np.ndarray  # (m, 6): the jet of C
+    chords: np.ndarray  # (m + 1, 2 + layers)
+    stiffness: np.ndarray  # (m + 1,): the mean of C at the ends of each piece
+
+
 @kernel
-def frame_product(jets, weights, i, j):
+def frame_product(strand, i, j):
     """F_i^T F_j, where F = (I, w grad x_3, ..., w grad x_n)^T maps the plane into R^n."""
     a, b, c, d = 1.0, 0.0, 0.0, 1.0
-    for k in range(weights.shape[0]):
-        w = weights[k] * weights[k]
+    jets = strand.jets
+    for k in range(strand.weights.shape[0]):
+        w = strand.weights[k] * strand.weights[k]
         a += w * jets[i, k, 1] * jets[j, k, 1]
         b += w * jets[i, k, 1] * jets[j, k, 2]
         c += w * jets[i, k, 2] * jets[j, k, 1]
@@ -62,17 +74,61 @@ def frame_product(jets, weights, i, j):
     return Block(a, b, c, d)
 
 
+@inner_kernel
+def seen_from(strand, i, piece):
+    """F_i^T times the chord of a piece."""
+    chord = strand.chords[piece]
+    x, y = chord[0], chord[1]
+    for k in range(strand.weights.shape[0]):
+        rise = strand.weights[k] * chord[k + 2]
+        x += rise * strand.jets[i, k, 1]
+        y += rise * strand.jets[i, k, 2]
+    return x, y
+
+
+@inner_kernel
+def squared_chord(strand, piece):
+    total = 0.0
+    for k in range(strand.chords.shape[1]):
+        total += strand.chords[piece, k] * strand.chords[piece, k]
+    return total
+
+
 @kernel
-def own_block(jets, weights, pull, i, curvature):
-    """Half the energy's second derivative by point i: 2 F^T F + sum_k pull_k w_k Hess x_k."""
-    m = frame_product(jets, weights, i, i)
-    a, b, d = 2.0 * m.a, 2.0 * m.b, 2.0 * m.d
-    for k in range(weights.shape[0]):
-        w = curvature * weights[k] * pull[i, k + 2]
-        a += w * jets[i, k, 3]
-        b += w * jets[i, k, 4]
-        d += w * jets[i, k, 5]
+def own_block(strand, pull, i, curvature):
+    """Half the energy's second derivative by point i.
+
+    Of what the layers and the cost bend, the share ``curvature`` is taken.
+    """
+    m, costs = frame_product(strand, i, i), strand.costs
+    stiffness = strand.stiffness[i] + strand.stiffness[i + 1]
+    a, b, d = stiffness * m.a, stiffness * m.b, stiffness * m.d
+    for k in range(strand.weights.shape[0]):
+        w = curvature * strand.weights[k] * pull[i, k + 2]
+        a += w * strand.jets[i, k, 3]
+        b += w * strand.jets[i, k, 4]
+        d += w * strand.jets[i, k, 5]
+    (ax, ay), (bx, by) = seen_from(strand, i, i), seen_from(strand, i, i + 1)
+    x, y = 0.5 * curvature * (ax - bx), 0.5 * curvature * (ay - by)
+    squares = 0.25 * curvature * (squared_chord(strand, i) + squared_chord(strand, i + 1))
+    a += 2.0 * x * costs[i, 1] + squares * costs[i, 3]
+    b += x * costs[i, 2] + y * costs[i, 1] + squares * costs[i, 4]
+    d += 2.0 * y * costs[i, 2] + squares * costs[i, 5]
     return Block(a, b, b, d)
+
+
+@kernel
+def link_block(strand, i, curvature):
+    """Half the energy's second derivative by points i and i + 1."""
+    m, stiffness, costs = frame_product(strand, i, i + 1), strand.stiffness[i + 1], strand.costs
+    (ax, ay), (bx, by) = seen_from(strand, i, i + 1), seen_from(strand, i + 1, i + 1)
+    half = 0.5 * curvature
+    return Block(
+        half * (costs[i, 1] * bx - ax * costs[i + 1, 1]) - stiffness * m.a,
+        half * (costs[i, 1] * by - ax * costs[i + 1, 2]) - stiffness * m.b,
+        half * (costs[i, 2] * bx - ay * costs[i + 1, 1]) - stiffness * m.c,
+        half * (costs[i, 2] * by - ay * costs[i + 1, 2]) - stiffness * m.d,
+    )
 
 
 @kernel
@@ -84,10 +140,11 @@ def confined(m, projector):
 
 
 @kernel
-def fill_derivative(jets, weights, pull, projectors, derivative):
+def fill_derivative(strand, pull, drift, projectors, derivative):
     """Half the energy's derivative by each point, (m, 2), along the moves it is free to make."""
+    jets, weights = strand.jets, strand.weights
     for i in range(pull.shape[0]):
-        gx, gy = pull[i, 0], pull[i, 1]
+        gx, gy = drift[i, 0] + pull[i, 0], drift[i, 1] + pull[i, 1]
         for k in range(weights.shape[0]):
             gx += weights[k] * jets[i, k, 1] * pull[i, k + 2]
             gy += weights[k] * jets[i, k, 2] * pull[i, k + 2]
@@ -102,7 +159,7 @@ def put(blocks, i, m):
 
 
 @kernel
-def eliminate(jets, weights, pull, projectors, curvature, pivots, links, step):
+def eliminate(strand, pull, projectors, curvature, pivots, links, step):
     """Forward elimination of H step = -derivative; ``step`` holds the derivative on entry.
 
     pivots : the inverses of the diagonal blocks. links : the blocks above the diagonal.
@@ -111,12 +168,11 @@ def eliminate(jets, weights, pull, projectors, curvature, pivots, links, step):
     """
     for i in range(step.shape[0]):
         p = entry(projectors, i)
-        m = confined(own_block(jets, weights, pull, i, curvature), p)
+        m = confined(own_block(strand, pull, i, curvature), p)
         gx, gy = -step[i, 0], -step[i, 1]
         if i > 0:
-            q = product(entry(projectors, i - 1), frame_product(jets, weights, i - 1, i))
-            link = product(q, p)
-            put(links, i - 1, Block(-link.a, -link.b, -link.c, -link.d))
+            q = product(entry(projectors, i - 1), link_block(strand, i - 1, curvature))
+            put(links, i - 1, product(q, p))
             left = product(transposed(entry(links, i - 1)), entry(pivots, i - 1))
             k = product(left, entry(links, i - 1))
             m = Block(m.a - k.a, m.b - k.b, m.c - k.c, m.d - k.d)
@@ -164,18 +220,18 @@ def downward(pivots, links, step, row):
 
 
 @kernel
-def newton_step(jets, weights, pull, projectors, curvature, pivots, links, derivative, step):
+def newton_step(strand, pull, drift, projectors, curvature, pivots, links, derivative, step):
     """Newton's step (m, 2) for the points of a polyline, both of its ends left out.
 
-    jets (m, layers, 6) at the points, pull (m, n) in R^n on each; where H is not positive
+    pull (m, n) on each point in R^n, drift (m, 2) of the cost; where H is not positive
     definite, a direction of negative curvature instead. Returns whether it is.
-    curvature : 1 for Newton's step; 0 leaves out the second derivatives of the layers, which
+    curvature : 1 for Newton's step; 0 leaves out what the layers and the cost bend, which
     makes H positive definite always.
     """
-    fill_derivative(jets, weights, pull, projectors, derivative)
+    fill_derivative(strand, pull, drift, projectors, derivative)
     for i in range(step.shape[0]):
         step[i, 0], step[i, 1] = derivative[i, 0], derivative[i, 1]
-    rows = eliminate(jets, weights, pull, projectors, curvature, pivots, links, step)
+    rows = eliminate(strand, pull, projectors, curvature, pivots, links, step)
     if rows < step.shape[0]:
         downward(pivots, links, step, rows)
         return False

@@ -20,11 +20,11 @@ def area_to_search(tree, options):
     """The bounds' area, or that of the ellipse which holds all better paths if it is smaller.
 
     A path of length c stays where the planar distances to start and goal, which are at
-    most the chords, sum to at most c.
+    most the chords, sum to at most c over the least cost.
     """
     area = (options.x1 - options.x0) * (options.y1 - options.y0)
     if options.informed and tree.counters[GOAL] >= 0:
-        longest = tree.vertices[tree.counters[GOAL]].cost
+        longest = tree.vertices[tree.counters[GOAL]].cost / tree.floor
         focal = distance_to_goal(tree, options, 0)
         area = min(area, 0.25 * math.pi * longest * math.sqrt(max(longest**2 - focal**2, 0.0)))
     return area
@@ -37,19 +37,20 @@ def can_improve(surface, tree, x, y):
     a, b = tree.vertices[0], tree.vertices[goal]
     from_start = (x - a.x) * (x - a.x) + (y - a.y) * (y - a.y)
     to_goal = (x - b.x) * (x - b.x) + (y - b.y) * (y - b.y)
-    if math.sqrt(from_start) + math.sqrt(to_goal) >= b.cost:
+    longest = b.cost / tree.floor
+    if math.sqrt(from_start) + math.sqrt(to_goal) >= longest:
         return False
     for layer in range(tree.lifted.shape[1]):
         z = surface.weights[layer] * value_at(surface, layer, x, y)
         from_start += (z - tree.lifted[0, layer]) ** 2
         to_goal += (z - tree.lifted[goal, layer]) ** 2
-    return math.sqrt(from_start) + math.sqrt(to_goal) < b.cost
+    return math.sqrt(from_start) + math.sqrt(to_goal) < longest
 
 
 @inner_kernel
 def point_of_ellipse(tree, options, u, v):
     """The point of the ellipse of better paths for (u, v) in the unit square, uniformly."""
-    longest = tree.vertices[tree.counters[GOAL]].cost
+    longest = tree.vertices[tree.counters[GOAL]].cost / tree.floor
     ax, ay = tree.vertices[0].x, tree.vertices[0].y
     focal = distance_to_goal(tree, options, 0)
     width = math.sqrt(max(longest**2 - focal**2, 0.0))

@@ -1,7 +1,8 @@
 """The two surface classes, and their values, jets and metric at a point.
 
 A surface s(x1, x2) = (x1, x2, w_3 x_3, ..., w_n x_n) is the graph of n - 2 layers
-over the plane. ``Peaks`` is exact; ``Spline`` carries everything else.
+over the plane. ``Peaks`` is exact; ``Spline`` carries everything else. On a ``Spline`` lengths
+may be multiplied by a cost c(x1, x2) > 0; its logarithm is a spline, so that it stays above 0.
 """
 
 import math
@@ -29,6 +30,8 @@ class Spline(NamedTuple):
     y0: float
     dx: float  # knot spacing
     dy: float
+    log_cost: np.ndarray  # (0 or 1, ny + 2, nx + 2) float64: log c as one more layer
+    floor: float  # nowhere above c; 1 without a cost
 
 
 class Jet(NamedTuple):
@@ -175,12 +178,17 @@ def spline_value(surface, layer, x, y):
     return tensor_sum(surface.coefficients, layer, cell, basis(cell.u), basis(cell.v))
 
 
-@kernel
+@inner_kernel
 def spline_jet(surface, layer, x, y):
+    return jet_of_coefficients(surface, surface.coefficients, layer, x, y)
+
+
+@kernel
+def jet_of_coefficients(surface, c, layer, x, y):
     cell = spline_cell(surface, x, y)
     bx, by = basis(cell.u), basis(cell.v)
     sx, sy = basis_slope(cell.u), basis_slope(cell.v)
-    c, dx, dy = surface.coefficients, surface.dx, surface.dy
+    dx, dy = surface.dx, surface.dy
     return Jet(
         tensor_sum(c, layer, cell, bx, by),
         tensor_sum(c, layer, cell, sx, by) / dx,
@@ -204,7 +212,32 @@ def spline_metric(surface, x, y):
         h11 += fx * fx
         h12 += fx * fy
         h22 += fy * fy
+    if surface.log_cost.shape[0] > 0:
+        c2 = math.exp(2.0 * tensor_sum(surface.log_cost, 0, cell, bx, by))
+        return Metric(c2 * h11, c2 * h12, c2 * h22)
     return Metric(h11, h12, h22)
+
+
+@inner_kernel
+def peaks_log_cost(surface, x, y):
+    return Jet(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def spline_log_cost(surface, x, y):
+    if surface.log_cost.shape[0] == 0:
+        return Jet(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return jet_of_coefficients(surface, surface.log_cost, 0, x, y)
+
+
+@inner_kernel
+def peaks_floor(surface):
+    return 1.0
+
+
+@inner_kernel
+def spline_floor(surface):
+    return surface.floor
 
 
 # Either class
@@ -222,7 +255,17 @@ def jet_at(surface, layer, x, y):
 
 @per_class({Peaks: peaks_metric, Spline: spline_metric})
 def metric_at(surface, x, y):
-    """H = I + sum_k w_k^2 grad x_k grad x_k^T (paper, section 3.2)."""
+    """H = c^2 (I + sum_k w_k^2 grad x_k grad x_k^T) (paper, section 3.2; c is 1 there)."""
+
+
+@per_class({Peaks: peaks_log_cost, Spline: spline_log_cost})
+def log_cost_at(surface, x, y):
+    """The jet of log c."""
+
+
+@per_class({Peaks: peaks_floor, Spline: spline_floor})
+def floor_of(surface):
+    """A number that c is nowhere below."""
 
 
 # Many points at once: points (m, 2); results are filled in
@@ -248,6 +291,19 @@ def fill_jets(surface, points, jets):
             jets[m, layer, 3] = jet.fxx
             jets[m, layer, 4] = jet.fxy
             jets[m, layer, 5] = jet.fyy
+
+
+@kernel
+def fill_log_costs(surface, points, jets):
+    """Jets (m, 6) of log c."""
+    for m in range(points.shape[0]):
+        jet = log_cost_at(surface, points[m, 0], points[m, 1])
+        jets[m, 0] = jet.f
+        jets[m, 1] = jet.fx
+        jets[m, 2] = jet.fy
+        jets[m, 3] = jet.fxx
+        jets[m, 4] = jet.fxy
+        jets[m, 5] = jet.fyy
 
 
 @kernel

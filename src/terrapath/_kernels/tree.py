@@ -58,6 +58,7 @@ class Tree(NamedTuple):
     lifted: np.ndarray  # (n, layers) float64: weighted layer values
     counters: np.ndarray  # (COUNTERS,) int64
     buckets: Buckets
+    floor: float  # no cost of the surface is below it
     near: np.ndarray  # (n,) CANDIDATE: workspace
     stack: np.ndarray  # (n,) int32: workspace
 
@@ -82,14 +83,14 @@ class Options(NamedTuple):
 
 @inner_kernel
 def chord_between(tree, a, b):
-    """Chord between two vertices."""
+    """Chord between two vertices, times the least cost."""
     dx = tree.vertices[a].x - tree.vertices[b].x
     dy = tree.vertices[a].y - tree.vertices[b].y
     total = dx * dx + dy * dy
     for layer in range(tree.lifted.shape[1]):
         rise = tree.lifted[a, layer] - tree.lifted[b, layer]
         total += rise * rise
-    return math.sqrt(total)
+    return tree.floor * math.sqrt(total)
 
 
 @inner_kernel

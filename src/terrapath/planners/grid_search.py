@@ -13,6 +13,7 @@ from .._kernels import grid_search as kernels
 from ..errors import InputError
 from ..lattice import Lattice, default_spacing
 from ..problem import Path, Problem, Solution, Status
+from ..surface import Surface
 from ..validation import Array, require_count, require_positive
 from .base import Callback, Progress, answer_without_search
 from .tree_search import FEATURES_PER_PANEL
@@ -170,15 +171,16 @@ class _Search:
             reach *= 2
 
 
-def _allocate(lattice: Lattice, layers: int) -> kernels.Graph:
+def _allocate(lattice: Lattice, surface: Surface) -> kernels.Graph:
     """The arrays of a search. What it never comes to takes no memory: pages come at first use."""
     size = lattice.nx * lattice.ny + 2
     try:
         return kernels.Graph(
             vertices=np.zeros(size, kernels.VERTEX).view(np.recarray),
-            lifted=np.empty((size, layers)),
+            lifted=np.empty((size, len(surface.layers))),
             heap=np.empty(size + 1, kernels.ENTRY).view(np.recarray),
             counters=np.zeros(kernels.COUNTERS, np.int64),
+            floor=surface.least_cost,
         )
     except MemoryError:
         raise InputError(
@@ -198,7 +200,7 @@ def _prepare(problem: Problem, planner: Dijkstra) -> _Search:
         offsets=_offsets(planner.neighbours),
         joins=np.array([NO_NODES, NO_NODES]),
     )
-    graph = _allocate(lattice, len(problem.surface.layers))
+    graph = _allocate(lattice, problem.surface)
     (x0, y0), (x1, y1) = problem.start, problem.goal
     cells_apart = max(abs(x1 - x0) / lattice.dx, abs(y1 - y0) / lattice.dy)
     options = kernels.Options(

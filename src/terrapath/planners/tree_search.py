@@ -12,6 +12,7 @@ from .._kernels import rrt_star as kernels
 from .._kernels import tree as trees
 from .._kernels.buckets import Buckets
 from ..problem import History, Path, Problem, SearchTree, Solution, Status
+from ..surface import Surface
 from ..validation import Array
 from .base import Callback, Progress, answer_without_search
 
@@ -68,13 +69,14 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     )
 
 
-def _allocate(samples: int, layers: int) -> trees.Tree:
+def _allocate(samples: int, surface: Surface) -> trees.Tree:
     size = samples + 2  # the start, and the goal that may join with the last sample
     return trees.Tree(
         vertices=np.empty(size, trees.VERTEX).view(np.recarray),
-        lifted=np.empty((size, layers)),
+        lifted=np.empty((size, len(surface.layers))),
         counters=np.zeros(trees.COUNTERS, np.int64),
         buckets=Buckets(np.empty(size // 2 + 64, np.int32), np.zeros(3), np.zeros(2, np.int64)),
+        floor=surface.least_cost,
         near=np.empty(size, trees.CANDIDATE).view(np.recarray),
         stack=np.empty(size, np.int32),
     )
@@ -194,7 +196,7 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     answer = answer_without_search(problem, options.planner, options.seed)
     if answer is not None:
         return answer
-    tree = _allocate(options.samples, len(problem.surface.layers))
+    tree = _allocate(options.samples, problem.surface)
     settings = _kernel_options(problem, options)
     _prepare(problem, tree, settings)
     search = _Search(problem, options, settings, tree)

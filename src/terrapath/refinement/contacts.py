@@ -159,13 +159,16 @@ def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices
 
 
 def _forces(surface: Surface, path: Lifted) -> Array:
-    """Minus the derivative of the length by each inner point: (m - 2, 2), without unit."""
-    chords = np.diff(path.above, axis=0)
-    units = chords / np.maximum(np.linalg.norm(chords, axis=1), TINY)[:, None]
-    pulls = np.diff(units, axis=0)
+    """Minus the derivative of the length by each inner point, over the cost: (m - 2, 2)."""
+    chords, costs = path.chords, np.sqrt(path.stiffness)
+    sizes = np.linalg.norm(chords, axis=1)
+    pulls = np.diff(costs[:, None] * chords / np.maximum(sizes, TINY)[:, None], axis=0)
     weights = surface.data.weights[:, None]
     slopes = path.jets[1:-1, :, 1:3] * weights
-    return np.asarray(pulls[:, :2] + np.einsum("mk,mka->ma", pulls[:, 2:], slopes))
+    shares = sizes / costs
+    drift = 0.25 * (shares[1:] + shares[:-1])[:, None] * path.costs[1:-1, 1:3]
+    force = pulls[:, :2] + np.einsum("mk,mka->ma", pulls[:, 2:], slopes) - drift
+    return np.asarray(force / np.sqrt(path.costs[1:-1, :1]))
 
 
 def outwards(around: Surroundings, band: Band) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from .._kernels import refinement as kernels
-from .._kernels.surfaces import fill_jets
+from .._kernels.surfaces import fill_jets, fill_log_costs
 from ..surface import Surface
 from ..validation import Array
 
@@ -29,27 +29,54 @@ class Lifted(NamedTuple):
     points: Array  # (m, 2), map units
     jets: Array  # (m, layers, 6): each layer's value, gradient and second derivatives
     above: Array  # (m, n): the points of R^n, layers weighted
+    costs: Array  # (m, 6): the jet of the squared cost
+
+    @property
+    def chords(self) -> Array:
+        """(m - 1, n)."""
+        return np.diff(self.above, axis=0)
+
+    @property
+    def stiffness(self) -> Array:
+        """(m - 1,): the mean of the squared costs at the ends of each piece."""
+        return np.asarray(0.5 * (self.costs[1:, 0] + self.costs[:-1, 0]))
 
     @property
     def energy(self) -> float:
-        """Pieces times the sum of squared chords.
+        """Pieces times the sum of squared chords, each times its squared cost.
 
-        Least where the chords are equal and their sum, whose square it then is, is least.
+        Least where the pieces are equally long and their sum, whose square it then is, is least.
         """
-        steps = np.diff(self.above, axis=0)
-        return len(steps) * float(np.square(steps).sum())
+        squares = np.square(self.chords).sum(axis=1)
+        return len(squares) * float((self.stiffness * squares).sum())
 
     @property
     def pull(self) -> Array:
-        """(m - 2, n): the sum of the chords that leave each inner point, times -1."""
-        return -np.diff(self.above, n=2, axis=0)
+        """(m - 2, n): the sum of the chords that leave each inner point, stiff, times -1."""
+        return -np.diff(self.stiffness[:, None] * self.chords, axis=0)
+
+    @property
+    def drift(self) -> Array:
+        """(m - 2, 2): half the energy's derivative by the cost at each inner point."""
+        squares = np.square(self.chords).sum(axis=1)
+        return np.asarray(0.25 * self.costs[1:-1, 1:3] * (squares[1:] + squares[:-1])[:, None])
 
 
 def lift(surface: Surface, points: Array) -> Lifted:
     """Points (m, 2), map units, unchecked: off its edge a surface is continued."""
     jets = np.empty((len(points), len(surface.layers), 6))
     fill_jets(surface.data, points, jets)
-    return Lifted(points, jets, np.hstack([points, jets[:, :, 0] * surface.data.weights]))
+    above = np.hstack([points, jets[:, :, 0] * surface.data.weights])
+    return Lifted(points, jets, above, _squared_costs(surface, points))
+
+
+def _squared_costs(surface: Surface, points: Array) -> Array:
+    """(m, 6): the jet of c^2 = exp(2 log c) at points (m, 2)."""
+    logs = np.empty((len(points), 6))
+    fill_log_costs(surface.data, points, logs)
+    value, x, y, xx, xy, yy = 2.0 * logs.T
+    parts = (np.ones_like(x), x, y, xx + x * x, xy + x * y, yy + y * y)
+    return np.ascontiguousarray((np.exp(value) * np.stack(parts)).T)
 
 
 class Step(NamedTuple):
@@ -61,29 +88,37 @@ class Step(NamedTuple):
 
 
 def newton_step(
-    surface: Surface, path: Lifted, pull: Array, projectors: Array, curvature: float = 1.0
+    surface: Surface,
+    path: Lifted,
+    pull: Array,
+    drift: Array,
+    projectors: Array,
+    curvature: float = 1.0,
 ) -> Step:
     """The step that makes the pull on every inner point normal to the surface.
 
+    drift : (m - 2, 2), what the cost adds to the pull on the plane.
     projectors : (m - 2, 2, 2), onto the moves that each point is free to make.
-    curvature : 1 for Newton's step, 0 to leave out the second derivatives of the layers,
-    which makes a step that always leads down.
+    curvature : 1 for Newton's step, 0 to leave out what layers and cost bend, which makes a
+    step that always leads down.
     """
     count = len(pull)
     derivative, move = np.empty((count, 2)), np.empty((count, 2))
     pivots, links = np.empty((count, 2, 2)), np.empty((count, 2, 2))
-    jets, weights = path.jets[1:-1], surface.data.weights
+    strand = kernels.Strand(
+        path.jets[1:-1], surface.data.weights, path.costs[1:-1], path.chords, path.stiffness
+    )
     definite = kernels.newton_step(
-        jets, weights, pull, projectors, curvature, pivots, links, derivative, move
+        strand, pull, drift, projectors, curvature, pivots, links, derivative, move
     )
     return Step(definite, 2.0 * (count + 1) * derivative, move)
 
 
 def descent_step(surface: Surface, path: Lifted, projectors: Array) -> Step:
     """Newton's step; where the energy is not convex, one that leads down and off a saddle."""
-    step = newton_step(surface, path, path.pull, projectors)
+    step = newton_step(surface, path, path.pull, path.drift, projectors)
     if not step.definite:
-        plain = newton_step(surface, path, path.pull, projectors, 0.0)
+        plain = newton_step(surface, path, path.pull, path.drift, projectors, 0.0)
         way = -1.0 if np.vdot(step.move, step.derivative) > 0.0 else 1.0
         size = _spacing(path.points) / np.abs(step.move).max()
         move = plain.move + way * size * step.move

@@ -2,8 +2,9 @@
 
 The vertices of the polyline of least energy are off the geodesic by the square of their
 spacing. A geodesic of constant speed is one whose acceleration in R^n is normal to the
-surface; differences of fourth order measure that acceleration to the fourth power of the
-spacing, and the matrix of the polyline's Newton step serves to correct it.
+surface, but for what the slope of the cost makes of it; differences of fourth order measure
+that acceleration to the fourth power of the spacing, and the matrix of the polyline's Newton
+step serves to correct it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from scipy.interpolate import make_interp_spline
 from .._kernels.surfaces import fill_metric
 from ..surface import Surface
 from ..validation import Array
-from .newton import farthest_move, lift, newton_step
+from .newton import Lifted, farthest_move, lift, newton_step
 
 Curve = Callable[..., Array]  # shares of the way (m,) -> points (m, 2); with n: n-th derivative
 
@@ -32,16 +33,31 @@ MOST_POINTS = 8192
 
 _CENTRAL = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / 12.0
 _BESIDE_END = np.array([10.0, -15.0, -4.0, 14.0, -6.0, 1.0]) / 12.0
+_CENTRAL_SLOPE = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
+_SLOPE_BESIDE_END = np.array([-3.0, -10.0, 18.0, -6.0, 1.0, 0.0]) / 12.0
 
 
-def _pull(above: Array) -> Array:
-    """Minus the second difference at the inner points, of fourth order. (m, n) -> (m - 2, n)."""
-    pull = np.empty((len(above) - 2, above.shape[1]))
+def _differences(above: Array, central: Array, beside_end: Array, sign: float) -> Array:
+    """Differences of fourth order at the inner points, (m, n) -> (m - 2, n).
+
+    sign : what turning the order of the points makes of them.
+    """
+    found = np.empty((len(above) - 2, above.shape[1]))
     windows = (above[k : len(above) - 4 + k] for k in range(5))
-    pull[1:-1] = -sum(w * part for w, part in zip(_CENTRAL, windows, strict=True))
-    pull[0] = -_BESIDE_END @ above[:6]
-    pull[-1] = -_BESIDE_END @ above[:-7:-1]
-    return pull
+    found[1:-1] = sum(w * part for w, part in zip(central, windows, strict=True))
+    found[0] = beside_end @ above[:6]
+    found[-1] = sign * (beside_end @ above[:-7:-1])
+    return found
+
+
+def _pull_and_drift(path: Lifted) -> tuple[Array, Array]:
+    """Those of the curve through the points: -(C s')' and |s'|^2 / 2 grad C, of fourth order."""
+    second = _differences(path.above, _CENTRAL, _BESIDE_END, 1.0)
+    first = _differences(path.above, _CENTRAL_SLOPE, _SLOPE_BESIDE_END, -1.0)
+    cost, slope = path.costs[1:-1, :1], path.costs[1:-1, 1:3]
+    along = (slope * first[:, :2]).sum(axis=1)[:, None]
+    drift = 0.5 * np.square(first).sum(axis=1)[:, None] * slope
+    return -(cost * second + along * first), drift
 
 
 def correct(surface: Surface, points: Array) -> Array | None:
@@ -58,7 +74,7 @@ def correct(surface: Surface, points: Array) -> Array | None:
     points = points.copy()
     for _ in range(MOST_CORRECTIONS):
         path = lift(surface, points)
-        step = newton_step(surface, path, _pull(path.above), projectors)
+        step = newton_step(surface, path, *_pull_and_drift(path), projectors)
         size = float(np.abs(step.move).max())
         if not step.definite or not size < last:
             return None

@@ -71,7 +71,14 @@ def interpolate(values: Array, x: Array, y: Array, weights: Array) -> Spline:
     dx, dy = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
     coefficients = _coefficients(_coefficients(values, dx, 2), dy, 1)
     return Spline(
-        np.ascontiguousarray(coefficients), weights, float(x[0]), float(y[0]), float(dx), float(dy)
+        np.ascontiguousarray(coefficients),
+        weights,
+        float(x[0]),
+        float(y[0]),
+        float(dx),
+        float(dy),
+        log_cost=np.empty((0, 0, 0)),
+        floor=1.0,
     )
 
 

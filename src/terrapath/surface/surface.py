@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 
-from .._kernels.surfaces import Peaks, Spline, fill_jets, fill_values
+from .._kernels.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import (
     Array,
@@ -17,13 +18,18 @@ from ..validation import (
     as_array,
     as_bounds,
     as_points,
+    require_choice,
     require_not_negative,
     require_positive,
 )
+from .costs import limited, require_costs, with_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
 from .mask import Mask
 from .smoothing import FEATURES_PER_SCALE, Smoothing, check_scale
+
+
+Kind = Literal["rise", "cost"]
 
 
 @dataclass(frozen=True)
@@ -31,15 +37,21 @@ class Layer:
     """One scalar field over the plane.
 
     The weight multiplies the layer where it becomes a coordinate of R^n: a change of
-    one unit of the layer counts as ``weight`` map units of way.
+    one unit of the layer counts as ``weight`` map units of way. So it is with the kind "rise",
+    whose changes cost. Of the kind "cost" the level costs: lengths are multiplied by the layer
+    to the power of ``weight``.
     """
 
     name: str
     unit: str = ""
     weight: float = 1.0
+    kind: Kind = "rise"
 
     def __str__(self) -> str:
         unit = f" [{self.unit}]" if self.unit else ""
+        if self.kind == "cost":
+            power = f" ^ {self.weight:g}" if self.weight != 1.0 else ""
+            return f"cost {self.name}{unit}{power}"
         weight = f" x {self.weight:g}" if self.weight != 1.0 else ""
         return f"{self.name}{unit}{weight}"
 
@@ -90,21 +102,30 @@ def _make_layers(
     names: Sequence[str] | None,
     units: Sequence[str] | None,
     weights: Sequence[float] | None,
+    kinds: Sequence[str] | None = None,
 ) -> tuple[Layer, ...]:
     """Layers with defaults: the first is the height, the others are numbered as x_k."""
+    kinds = ["rise"] * count if kinds is None else kinds
     names = ["height", *(f"x{k}" for k in range(4, count + 3))] if names is None else names
     units = [""] * count if units is None else units
     weights = [1.0] * count if weights is None else weights
-    for what, given in (("names", names), ("units", units), ("weights", weights)):
+    lists = (("names", names), ("units", units), ("weights", weights), ("kinds", kinds))
+    for what, given in lists:
         if len(given) != count:
             raise InputError(f"{what} has {len(given)} entries for {count} layers; give one each")
     if len(set(names)) != count:
         raise InputError(f"names={list(names)} repeats a name; layers need distinct names")
-    for name, weight in zip(names, weights, strict=True):
+    for name, weight, kind in zip(names, weights, kinds, strict=True):
         require_not_negative(**{f"the weight of {name}": weight})
+        require_choice(("rise", "cost"), **{f"the kind of {name}": kind})
     return tuple(
-        Layer(str(n), str(u), float(w)) for n, u, w in zip(names, units, weights, strict=True)
+        Layer(str(n), str(u), float(w), "cost" if k == "cost" else "rise")
+        for n, u, w, k in zip(names, units, weights, kinds, strict=True)
     )
+
+
+def _weights(layers: Sequence[Layer]) -> Array:
+    return np.array([layer.weight for layer in layers])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,6 +143,8 @@ class Surface:
     resolution: float  # map units: the size of the smallest features
     nodata: Mask | None = None
     georeference: Georeference | None = None
+    costs: tuple[Layer, ...] = ()  # the layers of the kind "cost"; ``layers`` are the others
+    cost_data: Spline | None = None  # their logarithms, before their weights
 
     def __post_init__(self) -> None:
         steepest = _steepest(self.data)
@@ -178,6 +201,7 @@ class Surface:
         names: Sequence[str] | None = None,
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
+        kinds: Sequence[str] | None = None,
         nodata: Mask | None = None,
         georeference: Georeference | None = None,
     ) -> Surface:
@@ -188,6 +212,8 @@ class Surface:
         equal, the grid is resampled and the error at the samples reported in ``fit``.
         smoothing : standard deviation, map units, of a Gaussian that the layers are convolved
         with; the change that it makes at the samples is reported in ``fit.smoothing``.
+        kinds : of each layer, "rise" (the default) or "cost"; costs are above 0, and between
+        samples stay between those around.
         """
         array = np.asarray(values)
         if array.ndim == 2:
@@ -201,10 +227,23 @@ class Surface:
             if not (np.diff(axis) > 0.0).all():
                 raise InputError(f"{name} does not increase; flip it, and the values with it")
         array = as_array(array, "values", shape=(None, len(y), len(x)))
-        made = _make_layers(len(array), names, units, weights)
+        made = _make_layers(len(array), names, units, weights, kinds)
+        is_cost = np.array([layer.kind == "cost" for layer in made])
+        rises = tuple(layer for layer in made if layer.kind == "rise")
+        costs = tuple(layer for layer in made if layer.kind == "cost")
+        if not rises:
+            raise InputError(
+                f"all layers are of the kind 'cost' ({', '.join(c.name for c in costs)}); give "
+                "the ground as the first, zeros where it is flat"
+            )
         bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
         scale = check_scale(smoothing, bounds)
-        found = fit_grid(array, x, y, np.array([layer.weight for layer in made]), scale)
+        found = fit_grid(array[~is_cost] if costs else array, x, y, _weights(rises), scale)
+        logs = None
+        if costs:
+            require_costs(array[is_cost], x, y, [layer.name for layer in costs])
+            fitted = fit_grid(np.log(array[is_cost]), x, y, _weights(costs), scale)
+            logs = limited(fitted.spline)
         fit = Fit(
             f"bicubic spline through {len(x)} x {len(y)} samples",
             found.value_error,
@@ -212,7 +251,8 @@ class Surface:
         )
         spacing = max(np.diff(x).max(), np.diff(y).max())
         resolution = float(max(spacing, scale / FEATURES_PER_SCALE))
-        return cls(found.spline, made, bounds, fit, resolution, nodata, georeference)
+        data = with_costs(found.spline, logs)
+        return cls(data, rises, bounds, fit, resolution, nodata, georeference, costs, logs)
 
     @classmethod
     def from_function(
@@ -288,17 +328,23 @@ class Surface:
 
     def with_weights(self, weights: Mapping[str, float]) -> Surface:
         """The same surface with the weights of some layers changed."""
-        known = {layer.name for layer in self.layers}
+        known = {layer.name for layer in (*self.layers, *self.costs)}
         for name, weight in weights.items():
             if name not in known:
                 raise InputError(f"layer {name!r} is not known; there are {sorted(known)}")
             require_not_negative(**{f"the weight of {name}": weight})
-        layers = tuple(
-            replace(layer, weight=float(weights.get(layer.name, layer.weight)))
-            for layer in self.layers
+        layers, costs = (
+            tuple(
+                replace(layer, weight=float(weights.get(layer.name, layer.weight))) for layer in k
+            )
+            for k in (self.layers, self.costs)
         )
-        data = self.data._replace(weights=np.array([layer.weight for layer in layers]))
-        return replace(self, data=data, layers=layers)
+        data: Peaks | Spline = self.data._replace(weights=_weights(layers))
+        logs = self.cost_data
+        if logs is not None and isinstance(data, Spline):
+            logs = logs._replace(weights=_weights(costs))
+            data = with_costs(data, logs)
+        return replace(self, data=data, layers=layers, costs=costs, cost_data=logs)
 
     # Looking at it
 
@@ -338,6 +384,36 @@ class Surface:
         """Points (..., 2) -> (..., layers, 2, 2), layer units/map unit^2."""
         return self._jets(points)[..., [[3, 4], [4, 5]]]
 
+    def cost(self, points: Any) -> Array:
+        """Points (..., 2), map units -> (...): what lengths are multiplied by there."""
+        return np.asarray(np.exp(self.log_cost_jets(points)[..., 0]))
+
+    def log_cost_jets(self, points: Any) -> Array:
+        """Points (..., 2) -> (..., 6): log of the cost, d/dx1, d/dx2, and second derivatives."""
+        flat, shape = self._points(points)
+        jets = np.empty((len(flat), 6))
+        fill_log_costs(self.data, flat, jets)
+        return jets.reshape(*shape, 6)
+
+    def cost_values(self, points: Any) -> Array:
+        """Points (..., 2) -> (..., costs): each cost layer's own value, before its weight."""
+        flat, shape = self._points(points)
+        logs = np.empty((len(flat), len(self.costs)))
+        if self.cost_data is not None:
+            fill_values(self.cost_data, flat, logs)
+        return np.asarray(np.exp(logs).reshape(*shape, len(self.costs)))
+
+    @property
+    def least_cost(self) -> float:
+        """The cost is nowhere below this; 1 without cost layers."""
+        return self.data.floor if isinstance(self.data, Spline) else 1.0
+
+    @cached_property
+    def typical_cost(self) -> float:
+        """The geometric mean of the cost."""
+        logs = self.data.log_cost if isinstance(self.data, Spline) else np.empty(0)
+        return math.exp(float(logs.mean())) if logs.size else 1.0
+
     def lift(self, points: Any) -> Array:
         """Points (..., 2) -> (..., n): the points of R^n above them, layers weighted."""
         array = as_points(points)
@@ -345,4 +421,5 @@ class Surface:
 
     def __repr__(self) -> str:
         domain = "the whole plane" if self.bounds is None else str(self.bounds)
-        return f"Surface({', '.join(map(str, self.layers))}; {domain}; {self.fit})"
+        layers = ", ".join(map(str, (*self.layers, *self.costs)))
+        return f"Surface({layers}; {domain}; {self.fit})"
