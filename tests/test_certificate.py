@@ -396,7 +396,9 @@ def test_the_facts_of_a_box_close_in_at_second_order(on_spline):
             box = kernels.Box(x, y, half, half)
             facts = facts_of(surface, bound, 2, 2, box, goal)
             norm, lowest, _ = sampled_facts(surface, bound, box, goal)
-            margin = kernels.margin_of_box(surface.data, bound, goal, 0.9, 2, 2, box)
+            margin = kernels.margin_of_box(
+                surface.data, bound, kernels.Anchor(goal, 1.0, math.inf), 0.9, 2, 2, box
+            )
             sheet, terrain, points = (
                 oracles.Sheet(*bound),
                 oracles.Terrain(surface),
@@ -1447,7 +1449,8 @@ def test_what_overflows_proves_nothing():
     surface = tp.Surface.from_peaks([[(1e-145, 1e307, 0.5, 0.5)]]).data
     bound = kernels.Bound(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0)
     box = kernels.Box(0.5, 0.5, 0.5, 0.5)
-    assert kernels.margin_of_box(surface, bound, np.ones(3), 1.0, 0, 0, box) == -math.inf
+    anchor = kernels.Anchor(np.ones(3), 1.0, math.inf)
+    assert kernels.margin_of_box(surface, bound, anchor, 1.0, 0, 0, box) == -math.inf
 
 
 # Determinism

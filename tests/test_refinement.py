@@ -576,7 +576,7 @@ def test_newtons_step_solves_the_dense_system(seed):
     projectors[1], projectors[2] = np.outer(slide, slide), np.eye(2) * random.integers(0, 2)
     path = newton.lift(surface, points)
     assert path.energy == pytest.approx(energy(layers, points), rel=1e-12)
-    step = newton.newton_step(surface, path, path.pull, projectors)
+    step = newton.newton_step(surface, path, path.pull, path.drift, projectors)
     gradient, hessian = derivatives_by_differences(layers, points)
     wide = np.zeros((8, 8))
     for k in range(4):

@@ -24,6 +24,7 @@ from .errors import CertificateError, MapError
 from .files import written_whole
 from .lattice import Lattice
 from .problem import Problem
+from .surface.costs import span_within
 from .validation import Array, Bounds, as_array, as_bounds
 
 # Far above the rounding of the checker's own arithmetic, far below any gap.
@@ -360,19 +361,47 @@ def _overlap(a: Core, b: Core) -> bool:
     return a.column0 < b.column1 and b.column0 < a.column1 and a.row0 < b.row1 and b.row0 < a.row1
 
 
-def edge_margin(
-    problem: Problem, certificate: Certificate, core: Core, anchor: Array, factor: float
-) -> float:
-    """At most chord(anchor, p) + factor u(p) for all p on the edge of a core, map units.
+def _anchor(problem: Problem, certificate: Certificate, core: Core, end: Array) -> kernels.Anchor:
+    """An end of all paths, (2 + layers,) lifted, and what is sure of the ground around its core.
 
-    The chord is times the surface's least cost.
-    anchor (2 + layers,) : a lifted point, the start being the origin of the plane.
+    The ground is the core and half as much again on all sides. A path of length s there, costs left
+    out, has met no cost below c - G s, c being that at the end and G the steepest slope; so to
+    a distance of d it is (c - G d / 2) d long.
+    """
+    surface, data = problem.surface, problem.surface.data
+    if not (surface.costs and isinstance(data, Spline)):
+        return kernels.Anchor(end, 1.0, math.inf)
+    x0, y0, x1, y1 = _extent(certificate.lattice, core)
+    width, height = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
+    around = Bounds(x0 - width, y0 - height, x1 + width, y1 + height)
+    (x, y), bounds = np.array(problem.start) + end[:2], problem.bounds
+    # Beyond the bounds no path can go.
+    sides = (
+        (x - around.x1_min, around.x1_min > bounds.x1_min),
+        (y - around.x2_min, around.x2_min > bounds.x2_min),
+        (around.x1_max - x, around.x1_max < bounds.x1_max),
+        (around.x2_max - y, around.x2_max < bounds.x2_max),
+    )
+    far = min((distance for distance, is_inside in sides if is_inside), default=math.inf)
+    found, cost = span_within(data, around), float(surface.cost((x, y)))
+    farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
+    floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
+    return kernels.Anchor(end, floor, found.least * (1.0 - ROUNDING) * float(far))
+
+
+def edge_margin(
+    problem: Problem, certificate: Certificate, core: Core, end: Array, factor: float
+) -> float:
+    """At most distance(end, p) + factor u(p) for all p on the edge of a core, map units.
+
+    end (2 + layers,) : a lifted point, the start being the origin of the plane. The distance is
+    bounded by the chord and the least cost around.
     """
     return float(
         kernels.margin_of_core(
             _ground(problem).surface,
             _bound(problem, certificate),
-            anchor,
+            _anchor(problem, certificate, core, end),
             float(factor),
             core.column0,
             core.column1,
@@ -387,8 +416,8 @@ def proven_value(problem: Problem, certificate: Certificate, norm: float) -> flo
     """The bound that follows where the dual norm is at most ``norm``, map units.
 
     Let a path leave the start core for the last time at p, and enter the goal core after
-    that for the first time at q. It is at least chord(start, p) + (u(q) - u(p)) / M +
-    chord(q, goal) long, or meets a cell from where it is at least (W - u(p)) / M to the goal.
+    that for the first time at q. It is at least distance(start, p) + (u(q) - u(p)) / M +
+    distance(q, goal) long, or meets a cell from where it is at least (W - u(p)) / M to the goal.
     """
     surface, start, goal = _ground(problem)
     doubt = _doubt(surface)

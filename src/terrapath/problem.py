@@ -127,7 +127,37 @@ class Path:
         points = np.concatenate(pieces)
         steps = metric.segment_lengths(self.surface, points[:-1], points[1:])
         distance = np.concatenate([[0.0], np.cumsum(steps)])
-        return Profile(points, distance, self.surface.values(points))
+        values, costs = self.surface.values(points), self.surface.cost_values(points)
+        return Profile(points, distance, values, costs)
+
+    @cached_property
+    def contributions(self) -> dict[str, float]:
+        """What makes up the length: shares that add up to 1, by the profile.
+
+        A step ds under h without costs is the sum of dx_i^2 / ds over all coordinates of R^n:
+        "plane" is the share of the plane's, and each layer has its own. Costs have what they
+        multiply the length by on top, which is below 0 where that is below 1; several divide it
+        by their logarithms.
+        """
+        surface, profile = self.surface, self.profile
+        steps = np.diff(np.hstack([profile.points, profile.values * surface.data.weights]), axis=0)
+        sizes = np.maximum(np.linalg.norm(steps, axis=1), 1e-300)
+        parts = np.square(steps) / sizes[:, None]
+        amounts = {"plane": float(parts[:, :2].sum())}
+        for layer, part in zip(surface.layers, parts[:, 2:].T, strict=True):
+            amounts[layer.name] = float(part.sum())
+        if surface.costs:
+            middles = 0.5 * (profile.points[1:] + profile.points[:-1])
+            weights = np.array([layer.weight for layer in surface.costs])
+            logs = weights * np.log(surface.cost_values(middles))
+            total = logs.sum(axis=1)
+            each = np.where(np.abs(total) > 1e-12, np.expm1(total) / (total + 1e-300), 1.0)
+            for layer, log in zip(surface.costs, logs.T, strict=True):
+                amounts[layer.name] = float((log * each * sizes).sum())
+        whole = sum(amounts.values())
+        if whole == 0.0:
+            return dict.fromkeys(amounts, 0.0)
+        return {name: amount / whole for name, amount in amounts.items()}
 
     @cached_property
     def climb(self) -> float:
@@ -142,6 +172,7 @@ class Profile(NamedTuple):
     points: Array  # (m, 2), map units
     distance: Array  # (m,) length from the start under h, map units
     values: Array  # (m, layers), in the layers' units
+    costs: Array  # (m, costs): what the cost layers multiply lengths by, weights left out
 
 
 class Status(enum.Enum):

@@ -726,21 +726,33 @@ def least_norm(surface, bound, goal, horizon, order, needs, norm, cutting):
     return norm
 
 
+class Anchor(NamedTuple):
+    """An end of all paths, and how far it is from a point p nearby at least.
+
+    That is the lesser of ``floor`` times the chord and ``far``: as long as a path stays around
+    the anchor no cost is below the floor, and when it leaves it is ``far`` long already.
+    """
+
+    lifted: np.ndarray  # (2 + layers,)
+    floor: float
+    far: float
+
+
 @kernel
 def margin_of_box(surface, bound, anchor, factor, i, j, box):
-    """At most chord(anchor, p) + factor u(p) for any p of a box inside cell (i, j).
+    """At most distance(anchor, p) + factor u(p) for any p of a box inside cell (i, j).
 
-    Here the chord is times the least cost. It is convex in R^n, so that it is nowhere below its tangent at the box's centre.
-    anchor (2 + layers,) is a lifted point.
+    The chord is convex in R^n, so that it is nowhere below its tangent at the box's centre.
     """
-    floor = floor_of(surface)
-    east, north = box.x - anchor[0], box.y - anchor[1]
+    floor, end = anchor.floor, anchor.lifted
+    east, north = box.x - end[0], box.y - end[1]
     squared = east * east + north * north
     for k in range(surface.weights.shape[0]):
-        rise = layer_over(surface, k, box).value.c00 - anchor[2 + k]
+        rise = layer_over(surface, k, box).value.c00 - end[2 + k]
         squared += rise * rise
     chord = math.sqrt(squared)
     total = times_number(bound_over(bound, i, j, box).value, factor)
+    outside_margin = anchor.far + total.c00 - spread(total)
     if chord > 0.0:
         along_x, along_y = floor * box.a * east / chord, floor * box.b * north / chord
         tangent = Model(floor * chord, along_x, along_y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -748,9 +760,9 @@ def margin_of_box(surface, bound, anchor, factor, i, j, box):
         for k in range(surface.weights.shape[0]):
             value = layer_over(surface, k, box).value
             offset = minus(value, constant(value.c00))
-            rise = value.c00 - anchor[2 + k]
+            rise = value.c00 - end[2 + k]
             total = plus(total, times_number(offset, floor * rise / chord))
-    margin = total.c00 - spread(total)
+    margin = min(total.c00 - spread(total), outside_margin)
     # No number, where something overflowed.
     return margin if margin > -math.inf else -math.inf
 
@@ -777,7 +789,7 @@ def margin_of_side(surface, bound, anchor, factor, i, j, axis, at, cutting):
 
 @kernel
 def margin_of_core(surface, bound, anchor, factor, i0, i1, j0, j1, cutting):
-    """The least chord(anchor, p) + factor u(p) on the edge of the cells [i0, i1) x [j0, j1)."""
+    """The least margin on the edge of the cells [i0, i1) x [j0, j1)."""
     margin = math.inf
     left, right = bound.x0 + i0 * bound.dx, bound.x0 + i1 * bound.dx
     bottom, top = bound.y0 + j0 * bound.dy, bound.y0 + j1 * bound.dy

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from .._kernels.surfaces import Spline
 from ..errors import InputError
-from ..validation import Array
+from ..validation import Array, Bounds
 
 
 def require_costs(values: Array, x: Array, y: Array, names: Sequence[str]) -> None:
@@ -53,3 +54,38 @@ def with_costs(data: Spline, logs: Spline | None) -> Spline:
     return data._replace(
         log_cost=np.ascontiguousarray(total[None]), floor=math.exp(float(total.min()))
     )
+
+
+class Span(NamedTuple):
+    """What is sure of a surface inside a rectangle, by its coefficients."""
+
+    least: float  # cost
+    steepest: float  # slope of the cost on the plane, 1/map unit
+    rise: float  # how far apart two points' layers are at most, weighted, map units
+
+
+def span_within(data: Spline, bounds: Bounds) -> Span:
+    """Bounds on the cost and the layers of a surface with costs, inside a rectangle."""
+    rows = _cells(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.log_cost.shape[1])
+    columns = _cells(bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.log_cost.shape[2])
+    logs, layers = data.log_cost[0, rows, columns], data.coefficients[:, rows, columns]
+    slope = math.hypot(
+        float(np.abs(np.diff(logs, axis=1)).max()) / data.dx,
+        float(np.abs(np.diff(logs, axis=0)).max()) / data.dy,
+    )
+    heights = layers.max(axis=(1, 2)) - layers.min(axis=(1, 2))
+    return Span(
+        math.exp(float(logs.min())),
+        slope * math.exp(float(logs.max())),
+        math.hypot(*(data.weights * heights)),
+    )
+
+
+def _cells(low: float, high: float, origin: float, step: float, count: int) -> slice:
+    """The coefficients of an axis that the cells over [low, high] are made of.
+
+    The four from a cell's own number on bound the spline in it.
+    """
+    first = min(max(math.floor((low - origin) / step) - 1, 0), count - 4)
+    last = min(max(math.floor((high - origin) / step) + 1, first), count - 4)
+    return slice(first, last + 4)

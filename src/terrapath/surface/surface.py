@@ -28,7 +28,6 @@ from .georeference import Georeference
 from .mask import Mask
 from .smoothing import FEATURES_PER_SCALE, Smoothing, check_scale
 
-
 Kind = Literal["rise", "cost"]
 
 
