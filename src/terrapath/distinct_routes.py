@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import shapely
@@ -60,15 +60,23 @@ def alternatives(
 
 
 def routes_of_fields(
-    problem: Problem, from_start: DistanceField, from_goal: DistanceField, count: int
+    problem: Problem,
+    from_start: DistanceField,
+    from_goal: DistanceField,
+    count: int,
+    *,
+    must_stop: Callable[[], bool] | None = None,
 ) -> tuple[Path, ...]:
-    """As ``alternatives``, with both distance fields given, on one lattice."""
+    """As ``alternatives``, with both distance fields given, on one lattice.
+
+    must_stop : looked at after each route that was refined; it may end the search.
+    """
     found: list[Path] = []
     for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
         route = refine(problem, candidate)
         if not any(_is_same(problem, route, other) for other in found):
             found.append(route)
-        if tries >= TRIES * count:
+        if tries >= TRIES * count or (must_stop is not None and must_stop()):
             break
     return tuple(sorted(found, key=lambda path: path.length)[:count])
 

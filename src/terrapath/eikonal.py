@@ -338,12 +338,13 @@ class DistanceField:
         distance = float(self.at(end)[0])
         if not math.isfinite(distance):
             return None
-        step = STEP * min(self.lattice.dx, self.lattice.dy)
-        # No shortest path is longer on the plane than its length on the surface.
-        farthest = distance / self.surface.least_cost
-        points = np.empty((int(1.2 * farthest / step) + 16, 2))
+        # No shortest path is longer on the plane than its length over the least cost; where it is
+        # longest against the nodes it still visits each but a few times.
+        farthest = distance / self.surface.least_cost / min(self.lattice.dx, self.lattice.dy)
+        room = min(1.2 * farthest / STEP, 4.0 * self.values.size / STEP)
+        points = np.empty((int(room) + 16, 2))
         points[0] = end[0]
-        count = descent.trace(self.surface.data, self.free_space.data, self._field, step, points)
+        count = descent.trace(self.surface.data, self.free_space.data, self._field, STEP, points)
         return Path(self.surface, points[:count][::-1].copy()) if count else None
 
     @cached_property

@@ -179,7 +179,7 @@ RING = 3
 @kernel
 def better(surface, space, field, best, qx, qy, u, x, y):
     """The approach to (x, y) from q, if it is free and shorter than the best so far."""
-    if not (u < best.end and u < best.level):
+    if not (u < best.end and u < best.level) or (qx == x and qy == y):
         return best
     end = u + line_r(surface, qx, qy, x, y)
     if end < best.end and (not field.has_obstacles or segment_is_free(space, x, y, qx, qy)):
@@ -334,7 +334,8 @@ def clamp(x, low, high):
 
 @inner_kernel
 def step_down(grid, x, y, slope, step):
-    """A step against a slope, kept on the lattice."""
+    """A step of so many nodes against a slope, kept on the lattice."""
+    step /= nodes_apart(grid, slope.x, slope.y, 0.0, 0.0)
     right, top = grid.x0 + (grid.nx - 1) * grid.dx, grid.y0 + (grid.ny - 1) * grid.dy
     return clamp(x - step * slope.x, grid.x0, right), clamp(y - step * slope.y, grid.y0, top)
 
@@ -345,18 +346,18 @@ def descend(surface, space, field, x, y, level, step):
 
     A midpoint step where the field is smooth and less than ``level``; else the best approach.
     """
-    slope = slope_at(surface, space, field, x, y)
+    grid, slope = field.grid, slope_at(surface, space, field, x, y)
     if slope.value < math.inf:
-        mx, my = step_down(field.grid, x, y, slope, 0.5 * step)
+        mx, my = step_down(grid, x, y, slope, 0.5 * step)
         slope = slope_at(surface, space, field, mx, my)
-        nx, ny = step_down(field.grid, x, y, slope, step)
-        is_free = not field.has_obstacles or segment_is_free(space, x, y, nx, ny)
-        if slope.value < level and is_free:
-            return Slope(slope.value, nx, ny)
+        if slope.value < level:
+            nx, ny = step_down(grid, x, y, slope, step)
+            if not field.has_obstacles or segment_is_free(space, x, y, nx, ny):
+                return Slope(slope.value, nx, ny)
     best = approach(surface, space, field, x, y, level)
     if best.end == math.inf:
         return ROUGH_PLACE
-    share = min(step / math.hypot(best.x - x, best.y - y), 1.0)
+    share = min(step / nodes_apart(grid, x, y, best.x, best.y), 1.0)
     value = best.end + share * (best.begin - best.end)
     if not value < level:
         share, value = 1.0, best.begin
@@ -371,7 +372,7 @@ ARRIVED = 2.0
 def trace(surface, space, field, step, points):
     """Walk down the field from points[0] to the source; returns how many points.
 
-    step : of the walk on the plane, map units. Returns 0 where the walk does not arrive.
+    step : of the walk, in nodes. Returns 0 where the walk does not arrive.
     """
     level = math.inf
     x, y = points[0, 0], points[0, 1]

@@ -13,6 +13,9 @@ from ..problem import Problem, Solution, Status
 SEPARATED = "start and goal lie in different parts of the free space"
 
 
+# What a solution says that Ctrl-C ended.
+INTERRUPT = "interrupt"
+
 # What a planner is at.
 SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bound"
 

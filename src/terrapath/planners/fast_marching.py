@@ -6,11 +6,11 @@ import math
 import time
 from dataclasses import dataclass
 
-from ..eikonal import Medium, march_from
+from ..eikonal import DistanceField, Medium, march_from
 from ..lattice import Lattice, default_spacing
-from ..problem import Problem, Solution, Status
+from ..problem import Path, Problem, Solution, Status
 from ..validation import require_positive
-from .base import Callback, Progress, answer_without_search
+from .base import INTERRUPT, Callback, Progress, answer_without_search
 
 # Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
 HALVINGS = 2
@@ -22,16 +22,18 @@ class FastMarching:
 
     spacing : of the nodes, map units; by default a 250th of the region's longer side, or a cell
     of a finer map. Where no path is found, half and a quarter of it are tried.
+    time_limit : seconds, looked at while the field is solved.
 
     ``cost`` is the distance that the field gives at the goal, ``samples`` the nodes settled.
     Source: Mirebeau 2014 (stencils); Sethian 1996 (fast marching).
     """
 
     spacing: float | None = None
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
-        if self.spacing is not None:
-            require_positive(spacing=self.spacing)
+        optional = {"spacing": self.spacing, "time_limit": self.time_limit}
+        require_positive(**{name: value for name, value in optional.items() if value is not None})
 
     @property
     def name(self) -> str:
@@ -42,56 +44,66 @@ class FastMarching:
         """Plan. ``callback`` sees the progress and stops the planner by returning True."""
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
-        started = time.perf_counter()
-        spacing = self.spacing or default_spacing(problem.bounds, problem.surface.resolution)
-        settled, stopped = 0, False
-        for _ in range(HALVINGS + 1):
-            lattice = Lattice.spanning(problem.bounds, spacing)
-            total = lattice.nx * lattice.ny
+        return _Run(self, problem, callback).solve()
 
-            def watch(count: int, total: int = total) -> bool:
-                nonlocal settled, stopped
-                settled = count
-                seconds = time.perf_counter() - started
-                report = Progress(count, total, seconds, math.inf)
-                stopped = callback is not None and bool(callback(report))
-                return stopped
 
-            try:
-                medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
-                field = march_from(
-                    problem.surface, problem.free_space, problem.start, medium, watch=watch
-                )
-            except KeyboardInterrupt:
-                return self._without_path(problem, started, settled, Status.INTERRUPTED)
-            path = field.path_to(problem.goal)
-            if path is not None:
-                return Solution(
-                    problem=problem,
-                    planner=self.name,
-                    status=Status.SOLVED,
-                    path=path,
-                    cost=float(field.at(problem.goal)),
-                    seconds=time.perf_counter() - started,
-                    samples=settled,
-                    stopped_by=f"{lattice.nx:,} x {lattice.ny:,} nodes",
-                )
-            if stopped:
-                break
-            spacing *= 0.5
-        return self._without_path(problem, started, settled, Status.NOT_FOUND)
+class _Run:
+    """One run: the clock, and why it stopped."""
 
-    def _without_path(
-        self, problem: Problem, started: float, settled: int, status: Status
-    ) -> Solution:
-        reason = "interrupt" if status is Status.INTERRUPTED else "no way between the nodes"
+    def __init__(self, planner: FastMarching, problem: Problem, callback: Callback | None) -> None:
+        self.planner, self.problem, self.callback = planner, problem, callback
+        self.started = time.perf_counter()
+        self.settled, self.total, self.stopped_by = 0, 0, ""
+
+    def solve(self) -> Solution:
+        problem = self.problem
+        spacing = self.planner.spacing or default_spacing(
+            problem.bounds, problem.surface.resolution
+        )
+        try:
+            for _ in range(HALVINGS + 1):
+                lattice = Lattice.spanning(problem.bounds, spacing)
+                field = self.march(lattice)
+                path = field.path_to(problem.goal)
+                if path is not None:
+                    shape = f"{lattice.nx:,} x {lattice.ny:,} nodes"
+                    return self.answer(path, float(field.at(problem.goal)), shape)
+                if self.stopped_by:
+                    break
+                spacing *= 0.5
+        except KeyboardInterrupt:
+            self.stopped_by = INTERRUPT
+        return self.answer(None, None, self.stopped_by or "no way between the nodes")
+
+    def march(self, lattice: Lattice) -> DistanceField:
+        """The field, as far as there is time for it."""
+        problem = self.problem
+        self.total = lattice.nx * lattice.ny
+        medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
+        return march_from(
+            problem.surface, problem.free_space, problem.start, medium, watch=self.must_stop
+        )
+
+    def must_stop(self, settled: int) -> bool:
+        """Look at the callback and the clock."""
+        self.settled = settled
+        seconds, limit = time.perf_counter() - self.started, self.planner.time_limit
+        progress = Progress(settled, self.total, seconds, math.inf)
+        if self.callback is not None and self.callback(progress):
+            self.stopped_by = "callback"
+        elif limit is not None and seconds >= limit:
+            self.stopped_by = "time limit"
+        return bool(self.stopped_by)
+
+    def answer(self, path: Path | None, cost: float | None, stopped_by: str) -> Solution:
+        status = Status.NOT_FOUND if path is None else Status.SOLVED
         return Solution(
-            problem=problem,
-            planner=self.name,
-            status=status,
-            path=None,
-            cost=None,
-            seconds=time.perf_counter() - started,
-            samples=settled,
-            stopped_by=reason,
+            problem=self.problem,
+            planner=self.planner.name,
+            status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
+            path=path,
+            cost=cost,
+            seconds=time.perf_counter() - self.started,
+            samples=self.settled,
+            stopped_by=stopped_by,
         )

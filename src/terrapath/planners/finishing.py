@@ -12,10 +12,7 @@ from ..certificate import Certificate
 from ..problem import Problem, Solution, Status
 from ..refinement import refine
 from ..validation import require_bool, require_positive
-from .base import PROVING, REFINING, Callback, Planner, Progress
-
-# What a solution says that Ctrl-C ended.
-INTERRUPT = "interrupt"
+from .base import INTERRUPT, PROVING, REFINING, Callback, Planner, Progress
 
 
 class UnfinishedWarning(RuntimeWarning):

@@ -15,7 +15,7 @@ from ..lattice import Lattice, default_spacing
 from ..problem import Path, Problem, Solution, Status
 from ..surface import Surface
 from ..validation import Array, require_count, require_positive
-from .base import Callback, Progress, answer_without_search
+from .base import INTERRUPT, Callback, Progress, answer_without_search
 from .tree_search import FEATURES_PER_PANEL
 
 # Vertices settled between two looks at the clock, the callback and Ctrl-C.
@@ -242,7 +242,7 @@ def _run(search: _Search, callback: Callback | None) -> str:
             if reason := _reason_to_stop(search, callback):
                 return reason
     except KeyboardInterrupt:
-        return "interrupt"
+        return INTERRUPT
 
 
 def _path(search: _Search) -> Path | None:
@@ -294,7 +294,7 @@ def _search_grid(problem: Problem, planner: Dijkstra, callback: Callback | None)
     return Solution(
         problem=problem,
         planner=planner.name,
-        status=Status.INTERRUPTED if stopped_by == "interrupt" else status,
+        status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
         path=path,
         cost=None if path is None else search.best_cost,
         seconds=seconds,

@@ -11,8 +11,8 @@ from ..eikonal import DistanceField, Medium, march_from
 from ..lattice import Lattice, default_spacing
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
-from .base import Callback, Progress, answer_without_search
-from .finishing import INTERRUPT, bounded, warn_unfinished
+from .base import INTERRUPT, Callback, Progress, answer_without_search
+from .finishing import bounded, warn_unfinished
 
 # Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
 HALVINGS = 2
@@ -130,7 +130,13 @@ class _Run:
 
     def refine_routes(self, from_start: DistanceField, from_goal: DistanceField) -> None:
         try:
-            found = routes_of_fields(self.problem, from_start, from_goal, self.planner.routes)
+            found = routes_of_fields(
+                self.problem,
+                from_start,
+                from_goal,
+                self.planner.routes,
+                must_stop=self.must_stop,
+            )
         except Exception as error:
             warn_unfinished("no route could be refined; the path is fast marching's", error)
             return

@@ -14,7 +14,7 @@ from .._kernels.buckets import Buckets
 from ..problem import History, Path, Problem, SearchTree, Solution, Status
 from ..surface import Surface
 from ..validation import Array
-from .base import Callback, Progress, answer_without_search
+from .base import INTERRUPT, Callback, Progress, answer_without_search
 
 # Samples between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 512
@@ -158,7 +158,7 @@ def _run(search: _Search, callback: Callback | None) -> str:
                 return reason
     except KeyboardInterrupt:
         search.note()  # what the kernel had done when the signal was seen
-        return "interrupt"
+        return INTERRUPT
 
 
 def _path(problem: Problem, tree: trees.Tree) -> Path | None:
@@ -207,7 +207,7 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     return Solution(
         problem=problem,
         planner=options.planner,
-        status=Status.INTERRUPTED if stopped_by == "interrupt" else status,
+        status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
         path=path,
         cost=None if path is None else search.best_cost,
         seconds=seconds,
