@@ -179,7 +179,7 @@ RING = 3
 @kernel
 def better(surface, space, field, best, qx, qy, u, x, y):
     """The approach to (x, y) from q, if it is free and shorter than the best so far."""
-    if not (u < best.end and u < best.level) or (qx == x and qy == y):
+    if not (u < best.end and u < best.level):
         return best
     end = u + line_r(surface, qx, qy, x, y)
     if end < best.end and (not field.has_obstacles or segment_is_free(space, x, y, qx, qy)):
