@@ -40,7 +40,7 @@ if TYPE_CHECKING:
         RRTStar,
         plan,
     )
-    from .plotting import plot_field, plot_route
+    from .plotting import plot_field, plot_page, plot_profile, plot_route
     from .problem import Path, Problem, Solution, Status
     from .refinement import refine
     from .surface import Layer, Mask, Surface
@@ -78,6 +78,8 @@ _HOMES = {
     "Progress": "planners",
     "plan": "planners",
     "plot_field": "plotting",
+    "plot_page": "plotting",
+    "plot_profile": "plotting",
     "plot_route": "plotting",
     "Path": "problem",
     "Problem": "problem",
@@ -128,6 +130,8 @@ __all__ = [
     "metric",
     "plan",
     "plot_field",
+    "plot_page",
+    "plot_profile",
     "plot_route",
     "read_surface",
     "refine",

@@ -93,3 +93,9 @@ class Georeference:
     def to_lonlat(self, points: Array) -> Array:
         """Plane (..., 2) -> longitude and latitude in degrees: WGS 84 on Earth."""
         return np.stack(self._to_lonlat.transform(points[..., 0], points[..., 1]), axis=-1)
+
+    def from_lonlat(self, lonlat: Array) -> Array:
+        """Longitude and latitude in degrees (..., 2), as ``to_lonlat`` gives them -> the plane."""
+        return np.stack(
+            self._to_lonlat.transform(lonlat[..., 0], lonlat[..., 1], direction="INVERSE"), axis=-1
+        )
