@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from ...surface import Surface
+from ...surface.georeference import Georeference
 
 _SPELLINGS = {"meter": "metre", "kilometer": "kilometre", "feet": "foot", "us-ft": "US survey foot"}
 
@@ -29,7 +30,14 @@ def metres_per(unit: str) -> float | None:
     return None
 
 
+def plane_metres(reference: Georeference | None) -> float | None:
+    """Metres in a unit of the plane, by its CRS: there are two kinds of feet."""
+    if reference is None or not reference.crs.axis_info:
+        return None
+    return float(reference.crs.axis_info[0].unit_conversion_factor)
+
+
 def height_scale(surface: Surface) -> float:
     """What a unit of height is in units of the plane; 1 where either is not known."""
-    height, plane = metres_per(surface.layers[0].unit), metres_per(surface.unit)
+    height, plane = metres_per(surface.layers[0].unit), plane_metres(surface.georeference)
     return 1.0 if height is None or plane is None else height / plane
