@@ -31,6 +31,8 @@ RELIEF = 0.35  # the exaggeration at first is the largest that keeps to this sha
 OBSTACLE_COLOUR, EDGE_COLOUR = "#3b3b3b", "#101010"
 # Graphics cards count in 32 bits: far from zero, coordinates are shown from a nearer origin.
 FAR = 1000.0
+STYLE = "<style>body { margin: 0 }</style>"
+CAMERA = {"eye": {"x": -0.6, "y": -1.4, "z": 0.95}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
 # Where a marker is, for the pointer.
 AT = "%{customdata[0]:.10g}, %{customdata[1]:.10g}"
 
@@ -56,7 +58,7 @@ class Stage(NamedTuple):
         terrain = Terrain.sample(problem, SAMPLES)
         return cls(solution, terrain, origin, scale, LIFT * side * scale)
 
-    def drawn(self, points: Array) -> dict[str, Array]:
+    def drawn(self, points: Array, lifts: float = 1.0) -> dict[str, Array]:
         """x, y, z of lines over the terrain: never under its mesh, which is coarser."""
         terrain = self.terrain
         column = (points[:, 0] - terrain.x[0]) / (terrain.x[1] - terrain.x[0])
@@ -64,7 +66,7 @@ class Stage(NamedTuple):
         mesh = map_coordinates(terrain.values[0], [row, column], order=1, mode="nearest")
         heights = self.solution.problem.surface.values(points)[:, 0]
         x, y = (points - self.origin).T
-        return {"x": x, "y": y, "z": np.maximum(mesh, heights) + self.lift}
+        return {"x": x, "y": y, "z": np.maximum(mesh, heights) + lifts * self.lift}
 
 
 def _with_unit(name: str, unit: str) -> str:
@@ -200,7 +202,7 @@ def _marks(stage: Stage) -> list[Any]:
     marks.append(("goal", np.array([problem.goal]), "#ffb000", "diamond"))
     return [
         go.Scatter3d(
-            **stage.drawn(points),
+            **stage.drawn(points, lifts=2.0),
             mode="markers",
             marker={"size": 7, "color": colour, "symbol": symbol, "line": {"width": 1}},
             name=name,
@@ -232,7 +234,8 @@ def _layout(stage: Stage) -> dict[str, Any]:
     solution, bounds = stage.solution, stage.solution.problem.bounds
     surface, heights = solution.problem.surface, stage.terrain.values[0]
     side = max(bounds.width, bounds.height)
-    low, high = float(heights.min()), float(heights.max()) + 2.0 * stage.lift
+    # The floor is a little lower than the ground, or its lines would shine through.
+    low, high = float(heights.min()) - stage.lift, float(heights.max()) + 3.0 * stage.lift
     true = (high - low) / stage.scale / side
     flat = {"x": bounds.width / side, "y": bounds.height / side}
     ratios = [{**flat, "z": k * true} for k in EXAGGERATIONS]
@@ -252,7 +255,10 @@ def _layout(stage: Stage) -> dict[str, Any]:
             "zaxis": {"title": _axis_title(height.name, height.unit, 0.0), "range": [low, high]},
             "aspectmode": "manual",
             "aspectratio": ratios[first],
-            "camera": {"eye": {"x": -0.55, "y": -1.25, "z": 0.85}},
+            "camera": {
+                "eye": {"x": -0.6, "y": -1.4, "z": 0.95},
+                "center": {"x": 0, "y": 0, "z": -0.2},
+            },
         },
         "updatemenus": [
             {
@@ -303,8 +309,12 @@ def plot_page(solution: Solution, path: str | Path) -> None:
     target = Path(path)
     require_known_page(target)
     page = draw_page(solution).to_html(
-        include_plotlyjs=True, include_mathjax=False, full_html=True, div_id="terrapath"
+        include_plotlyjs=True,
+        include_mathjax=False,
+        full_html=True,
+        default_height="100vh",
+        div_id="terrapath",
     )
-    head = f"<head><title>{escape(_title(solution))}</title>"
+    head = f"<head><title>{escape(_title(solution))}</title>{STYLE}"
     with written_whole(target) as temporary:
         temporary.write_text(page.replace("<head>", head, 1), encoding="utf-8", errors="replace")
