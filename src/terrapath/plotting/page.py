@@ -32,7 +32,7 @@ OBSTACLE_COLOUR, EDGE_COLOUR = "#3b3b3b", "#101010"
 # Graphics cards count in 32 bits: far from zero, coordinates are shown from a nearer origin.
 FAR = 1000.0
 STYLE = "<style>body { margin: 0 }</style>"
-CAMERA = {"eye": {"x": -0.6, "y": -1.4, "z": 0.95}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
+CAMERA = {"eye": {"x": -0.55, "y": -1.3, "z": 0.85}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
 # Where a marker is, for the pointer.
 AT = "%{customdata[0]:.10g}, %{customdata[1]:.10g}"
 
