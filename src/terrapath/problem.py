@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -76,6 +77,14 @@ class Problem:
         if blocker.startswith("outside"):
             raise OutsideSurfaceError(f"{shown} is {blocker}; check the axis order or the CRS")
         raise InputError(f"{shown} is {blocker}; move it to free ground")
+
+    def between(self, start: Any, goal: Any, names: tuple[str, str] = ("start", "goal")) -> Problem:
+        """The same ground with another start and goal, which errors call by ``names``."""
+        other = copy.copy(self)
+        for known in ("straight_length", "is_unreachable"):
+            other.__dict__.pop(known, None)
+        other.start, other.goal = self._check(names[0], start), self._check(names[1], goal)
+        return other
 
     def path(self, points: Any) -> Path:
         """A path of this problem's surface through the given points."""
@@ -216,6 +225,7 @@ class Solution:
     history: History | None = None
     tree: SearchTree | None = None
     counters: dict[str, int] = field(default_factory=dict)
+    legs: tuple[Solution, ...] = ()  # of a tour, from each waypoint to the next
 
     @property
     def length(self) -> float | None:

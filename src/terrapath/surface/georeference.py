@@ -13,7 +13,7 @@ from pyproj.crs.coordinate_operation import TransverseMercatorConversion
 from pyproj.exceptions import CRSError
 
 from ..errors import MapError
-from ..validation import Array
+from ..validation import Array, Bounds
 
 
 def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
@@ -90,6 +90,16 @@ class Georeference:
             self._to_map.transform(points[..., 0], points[..., 1], direction="INVERSE"), axis=-1
         )
 
+    def rectangle_from_map(self, bounds: Bounds) -> Bounds:
+        """The upright rectangle of the plane around one of the map's own coordinates."""
+        return Bounds(*self._to_map.transform_bounds(*bounds, direction="INVERSE"))
+
     def to_lonlat(self, points: Array) -> Array:
         """Plane (..., 2) -> longitude and latitude in degrees: WGS 84 on Earth."""
         return np.stack(self._to_lonlat.transform(points[..., 0], points[..., 1]), axis=-1)
+
+    def from_lonlat(self, lonlat: Array) -> Array:
+        """Longitude and latitude in degrees (..., 2), as ``to_lonlat`` gives them -> the plane."""
+        return np.stack(
+            self._to_lonlat.transform(lonlat[..., 0], lonlat[..., 1], direction="INVERSE"), axis=-1
+        )
