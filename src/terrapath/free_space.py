@@ -92,10 +92,10 @@ def sort_obstacles(obstacles: Iterable[Obstacle]) -> Parts:
             f"obstacles[{owners[invalid][0]}] is not valid: "
             f"{shapely.is_valid_reason(whole[invalid][0])}; repair it with shapely.make_valid"
         )
-    return Parts(*_simple_parts(whole, owners), circles, masks)
+    return Parts(*simple_parts(whole, owners), circles, masks)
 
 
-def _simple_parts(geometries: Geometries, owners: Indices) -> tuple[Geometries, Indices]:
+def simple_parts(geometries: Geometries, owners: Indices) -> tuple[Geometries, Indices]:
     """Points, lines and polygons of geometries, however deep they are nested, none empty."""
     while (shapely.get_type_id(geometries) > POLYGON).any():
         geometries, which = shapely.get_parts(geometries, return_index=True)
@@ -113,17 +113,18 @@ def _refuse_points(parts: Parts) -> None:
         )
 
 
-def _outlines(geometries: Geometries) -> Geometries:
-    """The rings of polygons, and lines themselves, in their order."""
+def outlines(geometries: Geometries) -> tuple[Geometries, Indices]:
+    """The rings of polygons, and other parts themselves, in their order; whose each of them is."""
     rings, owners = shapely.get_rings(geometries, return_index=True)
-    is_line = shapely.get_type_id(geometries) != POLYGON
-    order = np.argsort(np.concatenate([owners, np.flatnonzero(is_line)]), kind="stable")
-    return np.concatenate([rings, geometries[is_line]])[order]
+    is_other = shapely.get_type_id(geometries) != POLYGON
+    owners = np.concatenate([owners, np.flatnonzero(is_other)])
+    order = np.argsort(owners, kind="stable")
+    return np.concatenate([rings, geometries[is_other]])[order], owners[order]
 
 
 def _edges(geometries: Geometries) -> Array:
     """Boundary edges (m, 4) of polygons with their holes, and of lines."""
-    corners, line = shapely.get_coordinates(_outlines(geometries), return_index=True)
+    corners, line = shapely.get_coordinates(outlines(geometries)[0], return_index=True)
     edges = np.hstack([corners[:-1], corners[1:]])
     return np.asarray(edges[line[1:] == line[:-1]].reshape(-1, 4))
 
@@ -238,7 +239,7 @@ class FreeSpace:
             if blocker := self.blocker(point):
                 raise InputError(f"{name}=({point[0]:.10g}, {point[1]:.10g}) is {blocker}")
         discs = np.array([circle.inscribed for circle in self.circles], np.object_)
-        walls = _outlines(np.concatenate([self._geometries, discs]))
+        walls, _ = outlines(np.concatenate([self._geometries, discs]))
         return separated(self.bounds, self.data, self.masks, walls, a, b)
 
 
