@@ -149,7 +149,9 @@ def test_a_raster_with_layers_is_planned_and_written_in_every_format(dem, tmp_pa
     for key in ("length", "lower_bound", "gap", "unrefined_length"):
         assert feature["properties"][key] == answer[key]
     header, *rows = outputs[1].read_text().splitlines()
-    assert header == "distance,x1,x2,longitude,latitude,height [m],rocks"
+    assert header == (
+        "distance,x,y,longitude,latitude,height [m],slope [degrees],ground slope [degrees],rocks"
+    )
     assert float(rows[-1].split(",")[0]) == pytest.approx(answer["length"], rel=1e-9)
     assert outputs[3].read_bytes().startswith(b"\x89PNG")
 

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
         RRTStar,
         plan,
     )
-    from .plotting import plot_field, plot_route
+    from .plotting import plot_field, plot_page, plot_profile, plot_route
     from .problem import Path, Problem, Solution, Status
     from .refinement import refine
     from .surface import Layer, Mask, Surface
@@ -91,6 +91,8 @@ _HOMES = {
     "Progress": "planners",
     "plan": "planners",
     "plot_field": "plotting",
+    "plot_page": "plotting",
+    "plot_profile": "plotting",
     "plot_route": "plotting",
     "Path": "problem",
     "Problem": "problem",
@@ -143,6 +145,8 @@ __all__ = [
     "metric",
     "plan",
     "plot_field",
+    "plot_page",
+    "plot_profile",
     "plot_route",
     "read_area",
     "read_obstacles",
