@@ -110,8 +110,8 @@ class MapSection:
     fill_holes: Annotated[
         float,
         Option(
-            "Fill holes without data up to this size, map units; larger ones stay blocked "
-            "[default: 0, none].",
+            "Fill holes without data whose longer side is at most this, map units; larger ones "
+            "stay blocked [default: 0, none].",
             NUMBER,
             form="SIZE",
         ),
@@ -119,8 +119,8 @@ class MapSection:
     smooth: Annotated[
         Smoothing,
         Option(
-            "Length scale, map units, over which noise of the heights is smoothed; auto takes "
-            "it from resolution and quantisation [default], none leaves the map as it is.",
+            "Smooth over this length (standard deviation, map units); auto is the least that "
+            "heights rounded to a step need [default], none leaves the map as it is.",
             'a finite number, "auto" or "none"',
             form="METRES|auto|none",
         ),
@@ -128,7 +128,7 @@ class MapSection:
     crs: Annotated[
         str | None,
         Option(
-            "CRS of a map that names none, or a wrong one, as EPSG:32617.",
+            "CRS of a map that names none, as EPSG:32617.",
             TEXT,
             form="CRS",
             example='"EPSG:32617"',

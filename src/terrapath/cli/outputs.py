@@ -12,7 +12,7 @@ from ..options import OutputSection
 from .remarks import remark
 
 if TYPE_CHECKING:
-    from ..problem import Solution
+    from ..problem import Problem, Solution
 
 
 def require_outputs(paths: Sequence[Path]) -> None:
@@ -75,10 +75,19 @@ class RouteOutputs:
                 require_known_picture(picture)
         pages = [] if asked.page is None else [Path(asked.page)]
         for page in pages:
-            require_ending(page, "page", ".html")
+            from ..plotting.page import require_known_page
+
+            require_known_page(page)
         for certificate in self.certificates:
             require_ending(certificate, "certificate", ".npz")
         require_outputs([*self.files, *pictures, *pages, *self.certificates])
+
+    def require_fit(self, problem: Problem) -> None:
+        """Raise MapError where a format cannot hold a route on this plane."""
+        from ..io.routes import require_fitting_format
+
+        for path in self.files:
+            require_fitting_format(path, problem.surface.georeference)
 
     def write(self, solution: Solution) -> None:
         """Write every file that there is something to write into."""

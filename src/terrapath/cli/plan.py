@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -100,6 +99,7 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
     outputs = RouteOutputs(output, len(route.via) + 1)
     outputs.check()
     itinerary = Question(scenario).itinerary()
+    outputs.require_fit(itinerary.problem)
     quiet = output.quiet or output.json
     answer = _solve(planner, itinerary, route.all_goals, quiet)
     # Shown before it is written, so that a full disk loses no answer.
@@ -111,7 +111,9 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
 
 def _print(answer: Answer, scenario: Scenario) -> None:
     if scenario.output.json:
-        typer.echo(json.dumps(answer.record()))
+        from ..io.routes.record import dump
+
+        typer.echo(dump(answer.record()), nl=False)
         return
     from .report import print_report
 

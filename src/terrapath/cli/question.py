@@ -15,6 +15,7 @@ from .options import is_scenario
 if TYPE_CHECKING:
     from ..problem import Problem
     from ..surface import Surface
+    from ..validation import Bounds
 
 
 def scenario_of(where: str, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
@@ -73,21 +74,26 @@ class Question:
         from ..problem import Problem
 
         limits = self.scenario.constraints
-        surface, options = place.surface, {}
+        surface = place.surface
         obstacles: list[Any] = []
-        for file in limits.obstacles:
-            from ..io import read_obstacles
+        area = None
+        if limits.obstacles or limits.keep_in:
+            from ..io import read_area, read_obstacles
 
-            obstacles.extend(read_obstacles(file, surface))
-        if limits.keep_in is not None:
-            from ..io.vectors import read_area
-
-            options["keep_in"] = read_area(limits.keep_in, surface.georeference)
-        if limits.radius:
-            options["radius"] = limits.radius
-        if limits.max_slope is not None:
-            options["max_slope"] = limits.max_slope
-        return Problem(surface, start, goal, place.bounds, obstacles, name=place.name, **options)
+            for file in limits.obstacles:
+                obstacles.extend(read_obstacles(file, surface))
+            area = None if limits.keep_in is None else read_area(limits.keep_in, surface)
+        return Problem(
+            surface,
+            start,
+            goal,
+            place.bounds,
+            obstacles,
+            radius=limits.radius,
+            max_slope=limits.max_slope,
+            keep_in=area,
+            name=place.name,
+        )
 
     def place(self) -> Place:
         """The scene or the map, weighted, and the region to plan in."""
@@ -123,7 +129,8 @@ class Question:
             raise InputError(
                 f"{asked.path!r} is neither a built-in scene ({', '.join(names())}) nor a file"
             )
-        surface = read_surface(path, **read_options(asked))
+        window = self.scenario.route.bounds
+        surface = read_surface(asked.path, within=window, **read_options(asked))
         return Place(surface, None, path.stem, {})
 
     def _end(self, place: Place, name: str, point: Point | None) -> Point:
@@ -151,7 +158,7 @@ def read_options(asked: MapSection) -> dict[str, Any]:
         from ..io import LayerSource
 
         sources = {
-            name: LayerSource(Path(table.file), table.band, table.weight)
+            name: LayerSource.of_file(table.file, table.band, table.weight)
             for name, table in getattr(asked, kind).items()
         }
         if sources:
@@ -222,23 +229,22 @@ def _inside(surface: Surface, place: Point, point: Point, name: str, remedy: str
     return place
 
 
-def _region(surface: Surface, rectangle: Rectangle) -> Any:
+def _region(surface: Surface, rectangle: Rectangle) -> Bounds:
     """A rectangle of the map's own coordinates on the plane; what is off the map is cut off."""
     from ..validation import Bounds, as_bounds
 
-    asked = as_bounds(rectangle)
-    reference = surface.georeference
-    if reference is None or reference.is_map_crs:
-        return asked
-    whole = surface.bounds
-    assert whole is not None
-    around = reference.rectangle_from_map(asked)
+    asked, whole, reference = as_bounds(rectangle), surface.bounds, surface.georeference
+    around = asked
+    if reference is not None and not reference.is_map_crs:
+        around = reference.rectangle_from_map(asked)
+    if whole is None:
+        return around
     low = [max(a, b) for a, b in zip(around[:2], whole[:2], strict=True)]
     high = [min(a, b) for a, b in zip(around[2:], whole[2:], strict=True)]
     if not (low[0] < high[0] and low[1] < high[1]):
         raise InputError(
             f"bounds={tuple(asked)} are off the map, {describe_extent(surface)}; "
-            "check the axis order: X is the longitude"
+            "check the axis order and the CRS"
         )
     return Bounds(*low, *high)
 

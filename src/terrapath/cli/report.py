@@ -131,15 +131,14 @@ def _contributions(path: Path) -> Iterator[tuple[str, str]]:
 def _constraints(problem: Problem) -> Iterator[tuple[str, str]]:
     """What the route has to mind besides the edge of the map."""
     unit = problem.surface.unit
-    obstacles = getattr(problem, "obstacles", ())
-    if obstacles:
-        yield "obstacles", f"{len(obstacles):,}"
-    if getattr(problem, "radius", 0.0):
-        yield "radius", _amount(problem.radius, unit) + " from every obstacle"
-    if getattr(problem, "max_slope", None) is not None:
-        yield "slope", f"at most {problem.max_slope:g} degrees"
-    if getattr(problem, "keep_in", None) is not None:
-        yield "area", "the route stays within the keep-in area"
+    if problem.obstacles:
+        yield "obstacles", f"{len(problem.obstacles):,}"
+    if problem.radius:
+        yield "vehicle radius", _amount(problem.radius, unit) + ", kept from everything blocked"
+    if problem.max_slope is not None:
+        yield "steepest ground", f"{problem.max_slope:g} degrees"
+    if problem.keep_in is not None:
+        yield "keep-in area", f"{problem.keep_in.area:,.6g} {unit}^2" if unit else "given"
 
 
 def _peak_memory() -> float:

@@ -59,6 +59,12 @@ class LayerSource:
         return cls(_as_path(match["path"]), int(match["band"] or 1), weight)
 
     @classmethod
+    def of_file(cls, name: str, band: int = 1, weight: float = 1.0) -> LayerSource:
+        """A band of a file, or of what GDAL reads under a name."""
+        require_not_negative(**{f"the weight of {name}": weight})
+        return cls(_as_path(name), band, weight)
+
+    @classmethod
     def of(cls, source: Any) -> LayerSource:
         """From a LayerSource, a path, an array, or text as ``parse`` takes it."""
         if isinstance(source, cls):

@@ -15,7 +15,7 @@ from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
 from shapely.geometry.base import BaseGeometry
 
-from ..errors import InputError, MapError
+from ..errors import InputError, MapError, TerrapathWarning
 from ..free_space import POINTS, Geometries, Indices, outlines, simple_parts
 from ..surface import Surface
 from ..surface.georeference import Georeference
@@ -40,7 +40,7 @@ Where: TypeAlias = Surface | Georeference | None
 Move: TypeAlias = Callable[[Array], Array]
 
 
-class VectorWarning(UserWarning):
+class VectorWarning(TerrapathWarning):
     """A vector file was not taken as it stands: something was assumed, or left out."""
 
 
