@@ -104,8 +104,13 @@ class MapSection:
         Option("A built-in scene, see `terrapath scenes`.", TEXT, example='"six-peaks"'),
     ] = None
     height_band: Annotated[
-        int | None,
-        Option("Band of the heights [default: 1].", WHOLE, form="BAND", example="1"),
+        int | str | None,
+        Option(
+            "Band of the heights, its number or the name of a variable [default: 1].",
+            "a whole number, or the name of a variable as text",
+            form="BAND",
+            example="1",
+        ),
     ] = None
     fill_holes: Annotated[
         float,

@@ -70,7 +70,7 @@ def _parse_layers(texts: list[str], option: str, form: str) -> LayerTables:
         name: LayerSource.parse(value) for name, value in _parse_pairs(texts, option, form).items()
     }
     return {
-        name: LayerTable(file=str(source.path), band=source.band, weight=source.weight)
+        name: LayerTable(file=str(source.path), band=int(source.band), weight=source.weight)
         for name, source in sources.items()
     }
 
@@ -122,6 +122,7 @@ def _value(declaration: Declared, given: Any) -> Any:
         (LayerTables, lambda texts: _parse_layers(texts, flag, form)),
         (Weights, lambda texts: _parse_weights(texts, flag, form)),
         (Smoothing, _parse_smoothing),
+        (int | str | None, lambda text: int(text) if text.isdecimal() else text),
         (Files, tuple),
     ]
     for known, read in readers:

@@ -92,7 +92,7 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     yield "goal", _point(problem, problem.goal)
     if surface.georeference is not None:
         yield "planned in", surface.georeference.name
-    yield "surface", str(surface.fit)
+    yield from _fit(surface)
     for layer in surface.layers:
         yield f"layer {layer.name}", _weight(layer, surface.unit)
     for layer in getattr(surface, "costs", ()):
@@ -104,6 +104,28 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     if solution.counters:
         yield "counters", _counter_line(solution)
     yield "memory", f"{_peak_memory():,.0f} MB at most"
+
+
+def _each(surface: Surface, values: Iterable[float]) -> str:
+    """A number of each layer, with its name and unit."""
+    layers = (*surface.layers, *getattr(surface, "costs", ()))
+    shown = zip(layers, values, strict=False)
+    return ", ".join(f"{layer.name} {value:.2g} {layer.unit}".rstrip() for layer, value in shown)
+
+
+def _fit(surface: Surface) -> Iterator[tuple[str, str]]:
+    """How the surface was made of what was given, and how far it is from that."""
+    fit = surface.fit
+    unit = surface.layers[0].unit if len(surface.layers) == 1 else "in the layers' units"
+    exact = fit.value_error == 0.0
+    yield "surface", fit.method if exact else f"{fit.method}; error {fit.value_error:.2g} {unit}"
+    if fit.smoothing is not None:
+        largest = _each(surface, fit.smoothing.largest_change)
+        yield (
+            "smoothed",
+            f"over {_amount(fit.smoothing.scale, surface.unit)}; moved by at most {largest}; "
+            f"rms {_each(surface, fit.smoothing.rms_change)}",
+        )
 
 
 def _weight(layer: Layer, unit: str) -> str:

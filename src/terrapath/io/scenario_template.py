@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import re
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,6 +21,8 @@ from ..surface import Surface
 
 # Words that name heights in the description of a band.
 HEIGHT_WORDS = ("height", "elevation", "altitude", "dem", "dtm", "dsm", "topograph")
+# What is made of heights and named after them.
+DERIVED_WORDS = ("slope", "aspect", "rough", "shade", "curvature", "error", "count")
 # Guessed ends lie on a grid of so many places a side, from corner to corner.
 PLACES = 9
 WIDTH = 88
@@ -88,7 +91,9 @@ def _bands(path: Path) -> list[Band]:
 def _height_band(bands: list[Band]) -> int:
     """The band that is described as heights, else the first."""
     for band in bands:
-        if any(word in band.description.lower() for word in HEIGHT_WORDS):
+        said = band.description.lower()
+        is_derived = any(word in said for word in DERIVED_WORDS)
+        if not is_derived and any(word in said for word in HEIGHT_WORDS):
             return band.number
     return 1
 
@@ -217,5 +222,6 @@ def _band_lines(bands: list[Band], height: int, file: str) -> list[str]:
     lines = [f"# Bands of {file}: {'; '.join(map(str, bands))}."]
     for band in bands:
         if band.number != height:
-            lines += _layer("layers", f"band_{band.number}", file, band.number)
+            name = re.sub(r"[^A-Za-z0-9_-]+", "_", band.description).strip("_")
+            lines += _layer("layers", name or f"band_{band.number}", file, band.number)
     return lines

@@ -183,7 +183,8 @@ class _Tour:
             return self.planner
         open_legs = max(count - 1 + self.goals - len(self.planned), 1)
         left = limit - (time.perf_counter() - self.started)
-        return _limited(self.planner, max(left, 1e-3) / open_legs)
+        limited: Planner = _limited(self.planner, max(left, 1e-3) / open_legs)
+        return limited
 
     def watch(self, number: int, count: int) -> Callback | None:
         """The callback, told which leg it sees."""
@@ -198,18 +199,15 @@ class _Tour:
         return see
 
 
-def _limited(planner: Any, seconds: float) -> Planner:
+def _limited(planner: Any, seconds: float) -> Any:
     """A planner with another time limit, and so the planner within it."""
-    if not is_dataclass(planner) or isinstance(planner, type):
-        return planner
-    names = {entry.name for entry in fields(planner)}
+    names = {entry.name for entry in fields(planner)} if is_dataclass(planner) else set()
     changes: dict[str, Any] = {}
     if "time_limit" in names:
         changes["time_limit"] = seconds
     if "planner" in names:
         changes["planner"] = _limited(planner.planner, seconds)
-    limited: Planner = replace(planner, **changes)
-    return limited
+    return replace(planner, **changes) if changes else planner
 
 
 def _interrupted(leg: Problem, planner: str) -> Solution:
