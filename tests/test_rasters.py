@@ -124,7 +124,8 @@ def test_no_data_becomes_blocked_cells_and_nothing_else_does(tmp_path, dtype, de
     holes = [(0, 0), (5, 3), (5, 4), (11, 9)]
     for hole in holes:
         bands[hole] = stored
-    surface = tp.read_surface(write(tmp_path / "dem.tif", bands, nodata=declared))
+    path = write(tmp_path / "dem.tif", bands, nodata=declared)
+    surface = tp.read_surface(path, smoothing=None)
     assert surface.nodata is not None
     assert surface.nodata.blocked.sum() == len(holes)
     places = centres()
@@ -419,9 +420,7 @@ def test_heights_without_a_unit_are_metres_only_on_a_plane_in_metres(tmp_path):
     feet = write(tmp_path / "feet.tif", HEIGHTS, crs="EPSG:2225")
     surface = tp.read_surface(feet)
     assert surface.unit == "ft"
-    assert surface.layers[0].unit != "m"
-    named = write(tmp_path / "named.tif", HEIGHTS, units=("ft",))
-    assert tp.read_surface(named).layers[0].unit == "ft"
+    assert surface.layers[0].unit == "ft"
 
 
 @pytest.mark.parametrize("crs", [UTM, None], ids=["projected", "no CRS"])

@@ -26,7 +26,16 @@ if TYPE_CHECKING:
         TerrapathError,
     )
     from .free_space import Circle, FreeSpace
-    from .io import LayerSource, read_surface, write_field, write_route
+    from .io import (
+        LayerSource,
+        RepairedWarning,
+        VectorWarning,
+        read_area,
+        read_obstacles,
+        read_surface,
+        write_field,
+        write_route,
+    )
     from .lattice import Lattice
     from .metric import chord, curve_length, line_r
     from .planners import (
@@ -61,6 +70,10 @@ _HOMES = {
     "Circle": "free_space",
     "FreeSpace": "free_space",
     "LayerSource": "io",
+    "RepairedWarning": "io",
+    "VectorWarning": "io",
+    "read_area": "io",
+    "read_obstacles": "io",
     "read_surface": "io",
     "write_field": "io",
     "write_route": "io",
@@ -115,10 +128,12 @@ __all__ = [
     "Problem",
     "Progress",
     "RRTStar",
+    "RepairedWarning",
     "Solution",
     "Status",
     "Surface",
     "TerrapathError",
+    "VectorWarning",
     "__version__",
     "alternatives",
     "chord",
@@ -133,6 +148,8 @@ __all__ = [
     "plot_page",
     "plot_profile",
     "plot_route",
+    "read_area",
+    "read_obstacles",
     "read_surface",
     "refine",
     "scenes",

@@ -373,6 +373,14 @@ def distance_field(
     Raises OutsideSurfaceError or InputError, naming the value and the remedy.
     """
     problem = Problem(surface, start, start, bounds, obstacles)
+    return field_of(problem, spacing=spacing, watch=watch)
+
+
+def field_of(
+    problem: Problem, *, spacing: float | None = None, watch: Watch | None = None
+) -> DistanceField:
+    """Distances from a problem's start through its free space; see ``distance_field``."""
+    surface = problem.surface
     chosen = default_spacing(problem.bounds, surface.resolution) if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(surface, lattice, problem.free_space)

@@ -42,7 +42,9 @@ class Lattice:
         """
         require_positive(spacing=spacing)
         if max(bounds.width, bounds.height) / spacing > MOST_NODES:
-            raise InputError(f"spacing={spacing:g} makes more than {MOST_NODES:,} nodes; widen it")
+            raise InputError(
+                f"spacing={spacing:g} makes more than {MOST_NODES:,} nodes; give a wider one"
+            )
         nx = max(math.ceil(bounds.width / spacing - 1e-9), 1) + 1
         ny = max(math.ceil(bounds.height / spacing - 1e-9), 1) + 1
         if nx * ny > MOST_NODES:

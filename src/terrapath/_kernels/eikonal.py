@@ -362,12 +362,14 @@ def offer(nodes, front, readers, nx, n):
             continue
         before = front.trial[reader]
         value = offered(nodes, front, nx, n, reader, np.int64(entry & 7))
+        # Written so that no number, where lengths overflow, is queued; nor is infinity.
+        if not value < before:
+            continue
         if before == math.inf:
             front.counters[QUEUED] += 1
-            enqueue(nodes, front, reader, value)
-        elif value < before:
+        else:
             dequeue(nodes, front, reader)
-            enqueue(nodes, front, reader, value)
+        enqueue(nodes, front, reader, value)
 
 
 @inner_kernel
@@ -379,7 +381,7 @@ def settled_value(nodes, front, source, nx, n):
         # Written so that no number, where the stencil has no settled neighbour, is replaced.
         if not value < edge:
             value = edge
-    return value
+    return value if value < math.inf else front.trial[n]
 
 
 @kernel

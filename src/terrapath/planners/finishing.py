@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from ..bounding import lower_bound
 from ..certificate import Certificate
+from ..errors import TerrapathWarning
 from ..problem import Problem, Solution, Status
 from ..refinement import refine
 from ..validation import require_bool, require_positive
@@ -18,7 +19,7 @@ from .base import PROVING, REFINING, Callback, Planner, Progress
 INTERRUPT = "interrupt"
 
 
-class UnfinishedWarning(RuntimeWarning):
+class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded, and is given as it was before."""
 
 

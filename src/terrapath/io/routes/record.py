@@ -36,8 +36,7 @@ def dump(record: Any, indent: int | None = None) -> str:
 
 def via_points(solution: Solution) -> Array:
     """(k, 2): where one leg ends and the next begins, map units; empty for a single leg."""
-    legs = tuple(getattr(solution, "legs", ()))
-    ends = [getattr(leg, "path", leg).points[-1] for leg in legs[:-1]]
+    ends = [leg.problem.goal for leg in solution.legs[:-1] if solution.path is not None]
     return np.array(ends, np.float64).reshape(-1, 2)
 
 
