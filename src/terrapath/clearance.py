@@ -166,7 +166,10 @@ def outside_of(area: Any, bounds: Bounds, radius: float) -> BaseGeometry:
 
 def _polygons(area: Any) -> Geometries:
     """The polygons of one geometry or several, joined where they overlap."""
-    given = [area] if isinstance(area, BaseGeometry) else list(area)
+    try:
+        given = [area] if isinstance(area, BaseGeometry) else list(area)
+    except TypeError:
+        raise InputError(f"keep_in={area!r} is no area; give shapely polygons") from None
     for shape in given:
         if not isinstance(shape, BaseGeometry) or shape.geom_type not in {
             "Polygon",
