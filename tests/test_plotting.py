@@ -237,7 +237,7 @@ def decoded(array):
 def test_a_page_holds_the_route_on_the_terrain(solution, tmp_path):
     plot_page(solution, tmp_path / "page.html")
     traces = traces_of(tmp_path / "page.html")
-    assert {"terrain", "blocked", "obstacles", "route", "start", "goal"} <= set(traces)
+    assert {"terrain", "blocked", "outlines", "route", "start", "goal"} <= set(traces)
     route, profile = traces["route"], solution.path.profile
     x, y, z = (decoded(route[axis]) for axis in "xyz")
     assert np.column_stack([x, y]).tolist() == profile.points.tolist()

@@ -25,7 +25,6 @@ from terrapath.files import folder_written_whole, require_writable
 from terrapath.io.routes import WRITERS, require_fitting_format, require_known_format
 from terrapath.io.routes.places import parts_in_degrees
 from terrapath.io.routes.profile import distinct, headings, slopes
-from terrapath.io.routes.units import metres_per
 from terrapath.surface.georeference import Georeference, local_projection
 
 MOON = CRS.from_proj4("+proj=eqc +lat_ts=27.5 +lon_0=-53 +R=1737400 +units=m +no_defs")
@@ -483,15 +482,6 @@ def test_standing_still_one_looks_where_one_looked():
     assert headings(points).tolist() == [[1, 0], [1, 0], [1, 0], [0, 1], [0, 1], [0, 1]]
     assert np.hypot(*headings(points).T).tolist() == [1.0] * 6
     assert headings(points[:2]).tolist() == [[1, 0], [1, 0]]
-
-
-@pytest.mark.parametrize(
-    ("unit", "metres"),
-    [("m", 1), ("metre", 1), ("meters", 1), ("km", 1000), ("ft", 0.3048), ("feet", 0.3048),
-     ("US survey foot", 1200 / 3937), ("", None), ("K", None), ("furlongs per fortnight", None)],
-)  # fmt: skip
-def test_units_by_their_names(unit, metres):
-    assert metres_per(unit) == (metres if metres is None else pytest.approx(metres, rel=1e-12))
 
 
 # All formats

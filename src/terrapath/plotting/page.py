@@ -13,6 +13,7 @@ from scipy.ndimage import map_coordinates
 
 from ..errors import MapError
 from ..files import written_whole
+from ..free_space import sort_obstacles
 from ..io.routes.profile import slopes
 from ..io.routes.record import via_points
 from ..io.routes.units import height_scale
@@ -28,7 +29,13 @@ ROUTE_POINTS = 5000
 LIFT = 0.004  # how far lines hover over the terrain, as a share of the longer side
 EXAGGERATIONS = (1, 2, 5)
 RELIEF = 0.35  # the exaggeration at first is the largest that keeps to this share of the side
-OBSTACLE_COLOUR, EDGE_COLOUR = "#3b3b3b", "#101010"
+EDGE_COLOUR = "#101010"
+# Why ground is not free, and its colour: as on the maps.
+REASONS = (
+    ("blocked or no data", "#3b3b3b"),
+    ("too steep", "#6b1f85"),
+    ("too near, or outside", "#8f8f8f"),
+)
 # Graphics cards count in 32 bits: far from zero, coordinates are shown from a nearer origin.
 FAR = 1000.0
 STYLE = "<style>body { margin: 0 }</style>"
@@ -110,22 +117,53 @@ def _terrain_traces(stage: Stage) -> list[Any]:
         name="terrain",
         hovertemplate=f"{hover}<br>slope %{{customdata:.1f}} degrees<extra></extra>",
     )
+    return [ground, *_blocked_traces(stage, place)]
+
+
+def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
+    """Ground that is not free, a little above the other, by the reason; reasons in the legend."""
+    import plotly.graph_objects as go
+
+    terrain = stage.terrain
     if not terrain.blocked.any():
-        return [ground]
+        return []
     over = np.where(terrain.blocked, terrain.values[0] + 0.5 * stage.lift, np.nan)
-    colour = [(0.0, OBSTACLE_COLOUR), (1.0, OBSTACLE_COLOUR)]
-    style = {"showscale": False, "hoverinfo": "skip", "name": "blocked"}
-    return [ground, go.Surface(**place, z=over.astype(np.float32), colorscale=colour, **style)]
+    reason = np.select([terrain.solid, terrain.steep], [0, 1], default=2)
+    last = len(REASONS) - 1
+    blocked = go.Surface(
+        **place,
+        z=over.astype(np.float32),
+        surfacecolor=reason.astype(np.uint8),
+        cmin=0,
+        cmax=last,
+        colorscale=[(k / last, colour) for k, (_, colour) in enumerate(REASONS)],
+        showscale=False,
+        hoverinfo="skip",
+        name="blocked",
+    )
+    keys = [
+        go.Scatter3d(
+            x=[None],
+            y=[None],
+            z=[None],
+            mode="markers",
+            marker={"color": colour, "symbol": "square", "size": 8},
+            name=name,
+        )
+        for k, (name, colour) in enumerate(REASONS)
+        if (terrain.blocked & (reason == k)).any()
+    ]
+    return [blocked, *keys]
 
 
 def _outlines(stage: Stage) -> list[Any]:
-    """Edges of polygons, walls and discs, laid over the terrain as one broken line."""
+    """Edges of polygons, walls and discs as given, laid over the terrain as one broken line."""
     import plotly.graph_objects as go
 
     problem = stage.solution.problem
-    space, bounds = problem.free_space, problem.bounds
-    shapes = [g.boundary if g.geom_type == "Polygon" else g for g in space.geometries]
-    shapes += [shapely.Point(c.x1, c.x2).buffer(c.radius).exterior for c in space.circles]
+    given, bounds = sort_obstacles(problem.constraints.obstacles), problem.bounds
+    shapes = [g.boundary if g.geom_type == "Polygon" else g for g in given.geometries]
+    shapes += [shapely.Point(c.x1, c.x2).buffer(c.radius).exterior for c in given.circles]
     step = max(bounds.width, bounds.height) / SAMPLES
     region = shapely.box(bounds.x1_min, bounds.x2_min, bounds.x1_max, bounds.x2_max)
     pieces = shapely.get_parts(shapely.segmentize(shapely.intersection(shapes, region), step))
@@ -137,7 +175,7 @@ def _outlines(stage: Stage) -> list[Any]:
         axis: np.concatenate([np.append(line[axis], np.nan) for line in drawn]) for axis in "xyz"
     }
     style = {"color": EDGE_COLOUR, "width": 4}
-    return [go.Scatter3d(**broken, mode="lines", line=style, name="obstacles", hoverinfo="skip")]
+    return [go.Scatter3d(**broken, mode="lines", line=style, name="outlines", hoverinfo="skip")]
 
 
 def _thinned(route: Route) -> Any:

@@ -15,7 +15,7 @@ from ...problem import Solution
 from ...surface import Surface
 from ...validation import Array
 from .profile import headings, slopes
-from .units import metres_per, plane_metres
+from .units import height_metres, plane_metres
 
 TOPIC, FRAME = "/plan", "map"
 # The oldest that the library writes: every ROS 2 since Humble reads it.
@@ -35,7 +35,7 @@ def require_library(path: Path) -> None:
 def positions(surface: Surface, route: Route) -> Array:
     """(m, 3): the profile's points in metres; heights without a unit count as the plane does."""
     plane = plane_metres(surface.georeference) or 1.0
-    height = metres_per(surface.layers[0].unit) or plane
+    height = height_metres(surface) or plane
     profile = route.profile
     return np.column_stack([plane * profile.points, height * profile.values[:, 0]])
 
