@@ -44,7 +44,8 @@ def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None)
     axes.set_ylabel("slope (degrees)")
     axes.legend(fontsize=8, loc="upper right", ncols=3, framealpha=0.85)
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.25 * (high - low))
+    # Room for the limit's line below, and for the legend above.
+    axes.set_ylim(low - 0.04 * (high - low), high + 0.25 * (high - low))
 
 
 def _draw_layer(axes: Any, path: Path, layer: int) -> None:

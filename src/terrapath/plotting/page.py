@@ -242,7 +242,12 @@ def _marks(stage: Stage) -> list[Any]:
         go.Scatter3d(
             **stage.drawn(points, lifts=2.0),
             mode="markers",
-            marker={"size": 7, "color": colour, "symbol": symbol, "line": {"width": 1}},
+            marker={
+                "size": 5 if name == "via" else 7,
+                "color": colour,
+                "symbol": symbol,
+                "line": {"width": 1},
+            },
             name=name,
             customdata=points,
             hovertemplate=f"{name}, {AT}<extra></extra>",
