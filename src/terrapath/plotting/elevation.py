@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-from ..io.routes.profile import Slopes, slopes
+from ..io.routes.profile import Column, Slopes, further_layers, slopes
 from ..io.routes.record import via_points
 from ..problem import Path, Solution
 from ..validation import Array
@@ -49,9 +49,8 @@ def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None)
     axes.set_ylim(low - 0.04 * (high - low), high + 0.25 * (high - low))
 
 
-def _draw_layer(axes: Any, path: Path, layer: int) -> None:
-    shown, profile = path.surface.layers[layer], path.profile
-    axes.plot(profile.distance, profile.values[:, layer], color=LAYER_COLOUR, lw=1.2)
+def _draw_layer(axes: Any, distance: Array, shown: Column) -> None:
+    axes.plot(distance, shown.values, color=LAYER_COLOUR, lw=1.2)
     axes.set_ylabel(with_unit(shown.name, shown.unit, "\n"))
 
 
@@ -71,29 +70,29 @@ def _mark_vias(axes: Any, solution: Solution, path: Path) -> None:
 def draw_charts(figure: Any, solution: Solution, path: Path) -> None:
     """Panels under each other with one axis of distance."""
     problem, distance = solution.problem, path.profile.distance
-    more = len(problem.surface.layers) - 1
-    ratios = [HEIGHT_PANEL, SLOPE_PANEL, *[LAYER_PANEL] * more]
+    more = further_layers(path)
+    ratios = [HEIGHT_PANEL, SLOPE_PANEL, *[LAYER_PANEL] * len(more)]
     axes = figure.subplots(
         len(ratios), sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios}
     )[:, 0]
     _draw_height(axes[0], path)
     _draw_slopes(axes[1], distance, slopes(path), getattr(problem, "max_slope", None))
-    for k in range(1, more + 1):
-        _draw_layer(axes[1 + k], path, k)
+    for panel, shown in zip(axes[2:], more, strict=True):
+        _draw_layer(panel, distance, shown)
     _mark_vias(axes, solution, path)
     unit = problem.surface.unit
     kilometres = unit == "m" and distance[-1] >= 10_000.0
     if kilometres:
         axes[-1].xaxis.set_major_formatter(FuncFormatter(lambda at, _: f"{at / 1000.0:g}"))
-    shown = f" ({'km' if kilometres else unit})" if unit else ""
-    axes[-1].set_xlabel(f"distance along the surface{shown}")
+    unit_shown = f" ({'km' if kilometres else unit})" if unit else ""
+    axes[-1].set_xlabel(f"distance along the surface{unit_shown}")
     axes[-1].set_xlim(0.0, distance[-1] or 1.0)
     for panel in axes:
         panel.grid(alpha=0.3)
     figure.align_ylabels(axes)
 
 
-def chart_size(solution: Solution) -> tuple[float, float]:
+def chart_size(path: Path) -> tuple[float, float]:
     """Width and height of the figure, inches."""
-    more = len(solution.problem.surface.layers) - 1
+    more = len(further_layers(path))
     return WIDTH, TITLE + HEIGHT_PANEL + SLOPE_PANEL + more * LAYER_PANEL

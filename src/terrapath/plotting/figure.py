@@ -79,7 +79,7 @@ def draw_profile(solution: Solution) -> Any:
 
     if solution.path is None:
         raise MapError("there is no profile to draw: no path was found")
-    figure = Figure(figsize=chart_size(solution), layout="constrained")
+    figure = Figure(figsize=chart_size(solution.path), layout="constrained")
     draw_charts(figure, solution, solution.path)
     figure.suptitle(_title(solution), fontsize=12)
     return figure

@@ -66,22 +66,22 @@ def profile_columns(solution: Solution) -> list[Column]:
     if surface.georeference is not None:
         longitude, latitude = in_degrees(surface.georeference, profile.points).T
         columns += [Column("longitude", "", longitude), Column("latitude", "", latitude)]
-    layers = [
-        Column(layer.name, layer.unit, values)
-        for layer, values in zip(surface.layers, profile.values.T, strict=True)
-    ]
+    height = Column(surface.layers[0].name, surface.layers[0].unit, profile.values[:, 0])
     slope = [
         Column("slope", "degrees", found.along),
         Column("ground slope", "degrees", found.ground),
     ]
-    return [*columns, layers[0], *slope, *layers[1:], *_cost(surface, profile.points)]
+    return [*columns, height, *slope, *further_layers(path)]
 
 
-def _cost(surface: Any, points: Array) -> list[Column]:
-    """What the cost layers together multiply lengths by, where there are any."""
-    if not getattr(surface, "costs", ()):
-        return []
-    return [Column("cost", "", surface.cost(points))]
+def further_layers(path: Path) -> list[Column]:
+    """All layers along the profile but the height: those whose changes cost, then the costs."""
+    surface: Any = path.surface
+    profile: Any = path.profile
+    costs = getattr(surface, "costs", ())
+    values = [*profile.values.T[1:], *(profile.costs.T if costs else ())]
+    layers = [*surface.layers[1:], *costs]
+    return [Column(a.name, a.unit, v) for a, v in zip(layers, values, strict=True)]
 
 
 def clean(text: str) -> str:
