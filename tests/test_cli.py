@@ -239,6 +239,7 @@ BAD_ARGUMENTS = {
     "negative weight": (["six-peaks", "--weight", "height=-3"], "height=-3"),
     "malformed weight": (["six-peaks", "--weight", "height"], "NAME=WEIGHT"),
     "degrees in the wrong order": (["jacksboro", "--start", "36.5,-84.2"], "longitude -84.4"),
+    "name too long": (["six-peaks", "--obstacles", 300 * "a"], "cannot be a file", "too long"),
     "unknown format": (["six-peaks", "--output", "x.shp"], "x.shp", ".geojson"),
     "unknown picture": (["six-peaks", "--plot", "x.bmp"], "x.bmp", ".png"),
     "no directory": (["six-peaks", "--output", "no/where.csv"], "no/where.csv", "directory"),
