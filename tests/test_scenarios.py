@@ -198,7 +198,7 @@ def test_one_goal_and_a_list_of_goals_are_told_apart(tmp_path):
 # Text that stands for {X}; what the one line says.
 HEAD = '# a comment\n[map]\nscene = "one-peak"\n\n'
 WRONG = {
-    "a word for a number": ('[constraints]\nradius = "wide"', "line 6", "radius", "'wide'", "number"),
+    "a word for a number": ('[constraints]\nradius = "wide"', "line 6", "'wide'", "number"),
     "true for a number": ("[constraints]\nradius = true", "line 6", "True", "a finite number"),
     "not a number": ("[constraints]\nradius = nan", "line 6", "a finite number"),
     "infinity": ("[planner]\nstep = inf", "line 6", "step", "a finite number"),
@@ -336,7 +336,7 @@ def test_bounds_are_in_the_maps_own_coordinates(folder, capsys):
     dem = "../maps/dem.tif"
     asked = ["--height-band", 2, "--start", "500300,4000100", "--goal", "500420,4000300", *QUICK]
     answer = answer_of(capsys, dem, *asked, "--bounds", "500290,4000020,500450,4000390")
-    x, y = np.array(answer["path"]).T
+    x = np.array(answer["path"])[:, 0]
     assert x.min() >= 500_290
     assert x.max() <= 500_450
     refused(capsys, ["plan", dem, *asked, "--bounds", "0,0,1,1"], "0")
@@ -457,7 +457,7 @@ def test_every_key_stands_in_a_written_scenario_and_can_be_switched_on(folder, c
             assert line in text
     switched = [
         line.removeprefix("# ")
-        if line.startswith("# ") and " = " in line or "# [" in line
+        if line.startswith("# ") and (" = " in line or "# [" in line)
         else line
         for line in text.split("\n")
     ]
