@@ -215,9 +215,9 @@ def _crs(source: Any, array: Any, x: Hashable, y: Hashable) -> CRS | None:
     ):
         attributes = array[dimension].attrs if dimension in array.coords else {}
         units = str(attributes.get("units", "")).lower()
-        if not (units.startswith("degree") and units.endswith(toward)):
-            if str(dimension).lower() not in names or units not in {"", *DEGREES}:
-                return None
+        by_name = str(dimension).lower() in names and units in {"", *DEGREES}
+        if not by_name and not (units.startswith("degree") and units.endswith(toward)):
+            return None
     return CRS.from_epsg(4326)
 
 

@@ -75,8 +75,8 @@ class LayerSource:
 
 
 def _as_path(text: str) -> Path | str:
-    """A Path, or the text where GDAL reads it as something else."""
-    return text if "://" in text else Path(text)
+    """A Path, or the text where GDAL reads it as something else: a Path drops slashes."""
+    return text if "://" in text or text.startswith("/vsi") else Path(text)
 
 
 class _Part(NamedTuple):

@@ -27,8 +27,8 @@ SECONDS_FOR_NETWORK = 30
 
 # What a variable of heights is called, the likeliest first.
 HEIGHT_NAMES = (
-    "height", "heights", "elevation", "elev", "dem", "dtm", "altitude", "orog", "topo", "topography",
-    "surface_altitude", "band1", "z",
+    "height", "heights", "elevation", "elev", "dem", "dtm", "altitude", "orog", "topo",
+    "topography", "surface_altitude", "band1", "z",
 )  # fmt: skip
 
 
@@ -211,11 +211,7 @@ def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
     found = parse_crs(dataset.crs, f"the CRS of {path}")
     transform = dataset.transform
     if transform.is_identity:
-        if dataset.gcps[0] or dataset.rpcs:
-            raise MapError(
-                f"{path} is placed by ground control points or camera coefficients only; bring it "
-                "onto a grid first (gdalwarp)"
-            )
+        _require_place_may_lack(path, dataset)
         transform = Affine(1.0, 0.0, 0.0, 0.0, -1.0, float(dataset.height))
     determinant = transform.a * transform.e - transform.b * transform.d
     if not (np.isfinite(list(transform)).all() and determinant != 0.0):
@@ -223,6 +219,21 @@ def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
             f"{path} has the geotransform {tuple(transform)[:6]}, which is none; check the file"
         )
     return Grid(dataset.height, dataset.width, transform, with_crs(found, crs, path))
+
+
+def _require_place_may_lack(path: str | Path, dataset: Any) -> None:
+    """Raise MapError where a place is described, but not one that GDAL makes a grid of."""
+    if dataset.gcps[0] or dataset.rpcs:
+        raise MapError(
+            f"{path} is placed by ground control points or camera coefficients only; bring it "
+            "onto a grid first (gdalwarp)"
+        )
+    if dataset.driver in {"netCDF", "HDF5", "HDF5Image"}:
+        raise MapError(
+            f"GDAL does not find in {path} where its cells lie: the coordinates lack a "
+            "standard_name or units, or do not go in equal steps; open it with "
+            "xarray.open_dataset and give that"
+        )
 
 
 def with_crs(found: CRS | None, given: CRS | None, label: object) -> CRS | None:
