@@ -546,8 +546,9 @@ def test_a_spline_does_not_ring_at_the_edge_of_a_hole(tmp_path, seed):
     free = ~missing[tuple(cells)]
     assert 500 < free.sum() < len(free)
     off = (surface.gradients(points) - whole.gradients(points))[free, 0]
-    assert np.abs(off).max() < 0.25 * np.hypot(*slope)  # nearest cells instead: 0.9
-    assert np.abs((surface.values(points) - whole.values(points))[free]).max() < 10.0
+    # With the nearest cells' values in the hole 1.2 to 1.9 times the slope, and 0.7 to 1.4 cells.
+    assert np.abs(off).max() < 0.06 * np.hypot(*slope)
+    assert np.abs((surface.values(points) - whole.values(points))[free]).max() < 0.05 * 10.0
 
 
 @pytest.mark.parametrize("dy", [1.0, 2.5])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,10 +42,27 @@ def gdal() -> Iterator[None]:
     logging.getLogger("rasterio").addHandler(logging.NullHandler())
     with (
         warnings.catch_warnings(),
+        _without_unraisable(),
         rasterio.Env(GDAL_CACHEMAX=CACHE_MEGABYTES, GDAL_HTTP_TIMEOUT=SECONDS_FOR_NETWORK),
     ):
         warnings.simplefilter("ignore")
         yield
+
+
+@contextmanager
+def _without_unraisable() -> Iterator[None]:
+    """Silence rasterio where a message of GDAL is no text: it cannot log it, and prints that."""
+    before = sys.unraisablehook
+
+    def hook(unraisable: Any) -> None:
+        if "rasterio" not in str(unraisable.object):
+            before(unraisable)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 @contextmanager
