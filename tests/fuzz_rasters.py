@@ -68,6 +68,7 @@ FILES = {
     "grid.asc": text_grid,
     "map.vrt": virtual,
     "classic.nc": lambda path: netcdf(path, format="NETCDF3_CLASSIC"),
+    "four.nc": lambda path: netcdf(path, format="NETCDF4"),
     "erdas.img": lambda path: geotiff(path, driver="HFA"),
 }
 

@@ -586,6 +586,46 @@ def test_only_holes_up_to_the_size_inside_the_map_are_filled(tmp_path):
         tp.read_surface(path, fill_holes=-1.0)
 
 
+# Rounded heights
+
+
+@pytest.mark.parametrize("stored", ["int16", "float32", "scaled"])
+def test_rounded_heights_are_smoothed_by_default_and_the_residual_is_reported(tmp_path, stored):
+    grid = Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 4_000_000.0)
+    rows, columns = np.indices((80, 90))
+    metres = np.round(30.0 * np.sin(columns / 20.0) * np.cos(rows / 25.0))
+    values = {"int16": metres, "float32": metres, "scaled": 10 * metres}[stored]
+    path = write(
+        tmp_path / "dem.tif", values.astype("int16" if stored == "scaled" else stored), grid
+    )
+    if stored == "scaled":
+        with rasterio.open(path, "r+") as dataset:
+            dataset.scales = (0.1,)
+    surface = tp.read_surface(path)
+    scale = 2.4 * (np.sqrt(0.1) if stored == "scaled" else 1.0)
+    assert surface.fit.smoothing.scale == pytest.approx(scale, rel=1e-3)
+    assert 0.05 < surface.fit.smoothing.rms_change[0] < 1.0
+    assert "smoothed over" in str(surface)
+    for smoothing in (None, 0, 0.0):
+        assert tp.read_surface(path, smoothing=smoothing).fit.smoothing is None
+    assert tp.read_surface(path, smoothing=5).fit.smoothing.scale == 5.0
+    coarse = tp.read_surface(path, decimate=2)  # half the noise, cells twice as large
+    assert coarse.fit.smoothing.scale == pytest.approx(scale, rel=1e-3)
+    for wrong in ("much", -1.0, np.nan, 1e9):
+        with pytest.raises(tp.InputError) as caught:
+            tp.read_surface(path, smoothing=wrong)
+        assert "smoothing=" in one_line(caught)
+
+
+def test_smoothing_carries_nothing_out_of_holes(tmp_path):
+    plane, missing = plane_with_hole()
+    path = write(tmp_path / "dem.tif", np.where(missing, np.nan, 10.0 * plane))
+    surface = tp.read_surface(path, smoothing=20.0)
+    places = centres(shape=plane.shape)
+    off = surface.values(places)[..., 0] - 10.0 * plane
+    assert np.abs(off[~missing]).max() < 0.1 * 10.0  # a tenth of what the ground rises in a cell
+
+
 # Costs
 
 

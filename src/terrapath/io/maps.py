@@ -23,7 +23,7 @@ from ..surface.smoothing import blocks, quantisation_step, scale_for_step
 from ..validation import Array, as_bounds, require_count, require_not_negative
 from .arrays import band_of_numpy, band_of_xarray, is_xarray
 from .bands import Band, View
-from .rasters import gdal, open_band
+from .rasters import classic_netcdf, gdal, open_band, open_classic_netcdf, reading
 
 _SOURCE = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?", re.DOTALL)
 
@@ -102,6 +102,11 @@ def _open(source: LayerSource, files: ExitStack, crs: CRS | None, *, heights: bo
         raise InputError(
             f"source {shown:.60} is not a map; give a path, an xarray object, or (values, x, y)"
         )
+    if (classic := classic_netcdf(place)) is not None:
+        file, variable = classic
+        dataset = open_classic_netcdf(file, files)
+        with reading(place):
+            return band_of_xarray(dataset, variable or band, crs, label=str(place))
     return open_band(place, band, files, crs=crs, heights=heights)
 
 

@@ -42,7 +42,7 @@ def gdal() -> Iterator[None]:
     logging.getLogger("rasterio").addHandler(logging.NullHandler())
     with (
         warnings.catch_warnings(),
-        _without_unraisable(),
+        _without_broken_messages(),
         rasterio.Env(GDAL_CACHEMAX=CACHE_MEGABYTES, GDAL_HTTP_TIMEOUT=SECONDS_FOR_NETWORK),
     ):
         warnings.simplefilter("ignore")
@@ -50,35 +50,42 @@ def gdal() -> Iterator[None]:
 
 
 @contextmanager
-def _without_unraisable() -> Iterator[None]:
-    """Silence rasterio where a message of GDAL is no text: it cannot log it, and prints that."""
-    before = sys.unraisablehook
+def _without_broken_messages() -> Iterator[None]:
+    """Silence where a message of GDAL is no text: rasterio cannot log it, and prints that.
 
-    def hook(unraisable: Any) -> None:
-        if "rasterio" not in str(unraisable.object):
-            before(unraisable)
+    It does so by both hooks of the interpreter, from within a callback of GDAL.
+    """
+    uncaught, unraisable = sys.excepthook, sys.unraisablehook
 
-    sys.unraisablehook = hook
+    def of_uncaught(kind: Any, error: Any, trace: Any) -> None:
+        if not issubclass(kind, UnicodeDecodeError):
+            uncaught(kind, error, trace)
+
+    def of_unraisable(what: Any) -> None:
+        if "rasterio" not in str(what.object):
+            unraisable(what)
+
+    sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable
     try:
         yield
     finally:
-        sys.unraisablehook = before
+        sys.excepthook, sys.unraisablehook = uncaught, unraisable
 
 
 @contextmanager
-def _reading(path: str | Path) -> Iterator[None]:
-    """Turn what goes wrong inside into one line that names the file."""
+def reading(path: str | Path, *, is_file: bool = True) -> Iterator[None]:
+    """Turn what goes wrong inside into one line that names the file, or the array."""
     try:
         yield
     except TerrapathError:
         raise
     except Exception as error:  # damaged files raise whatever GDAL, rasterio or NumPy do
-        raise _unreadable(path, error) from None
+        raise _unreadable(path, error, is_file=is_file) from None
 
 
-def _unreadable(path: str | Path, error: Exception) -> MapError:
+def _unreadable(path: str | Path, error: Exception, *, is_file: bool) -> MapError:
     # Asked only now: GDAL also reads names that are no paths, as in /vsizip/ or netcdf:.
-    if not _may_be_no_path(str(path)) and not _exists(path):
+    if is_file and not _may_be_no_path(str(path)) and not _exists(path):
         return MapError(f"{path} does not exist; check the path")
     # Rasterio puts the reason into the cause: its own message only points there.
     reason = " ".join(str(error.__cause__ or error).split()).rstrip(".") or type(error).__name__
@@ -117,7 +124,7 @@ class FileBand(Band):
 
         size = rows.stop - rows.start, columns.stop - columns.start
         window = Window(columns.start, rows.start, size[1], size[0])
-        with _reading(self.path):
+        with reading(self.path):
             stored = self.dataset.read(self.number, window=window)
             masked = self.dataset.read_masks(self.number, window=window) == 0
             values: Array = stored.astype(np.float64)
@@ -138,7 +145,7 @@ def open_band(
 
     number : the band, 1-based, or the name of a variable. crs : where the file has none.
     """
-    with _reading(path):
+    with reading(path):
         dataset = files.enter_context(_open(path))
         if dataset.count == 0 or isinstance(number, str):
             name, number = (number, 1) if isinstance(number, str) else (None, number)
@@ -154,6 +161,30 @@ def open_band(
             dataset=dataset,
             number=number,
             path=path,
+        )
+
+
+def classic_netcdf(path: str | Path) -> tuple[Path, str | None] | None:
+    """(file, variable or None) where a name is of a netCDF file of the classic format.
+
+    The netCDF library that GDAL reads those with crashes on damaged ones, and takes long.
+    """
+    match = re.fullmatch(r'(?i:netcdf):"?(.+?)"?(?::([^:"]+))?', str(path))
+    name, variable = (match[1], match[2]) if match else (str(path), None)
+    try:
+        with Path(name).open("rb") as file:
+            return (Path(name), variable) if file.read(3) == b"CDF" else None
+    except (OSError, ValueError):
+        return None
+
+
+def open_classic_netcdf(path: Path, files: Any) -> Any:
+    """The file as an xarray Dataset, read by SciPy; closed with the stack ``files``."""
+    import xarray
+
+    with reading(path):
+        return files.enter_context(
+            xarray.open_dataset(path, engine="scipy", decode_times=False, cache=False)
         )
 
 

@@ -193,7 +193,6 @@ class Grid:
         """Upright cells in a plane, rows from south to north: this grid's own where they are."""
         if not self.needs_warp:
             return self.southward()
-        from rasterio.errors import RasterioError
         from rasterio.warp import calculate_default_transform
 
         plane = self._plane()
@@ -203,7 +202,7 @@ class Grid:
             transform, columns, rows = calculate_default_transform(
                 source_crs, plane_crs, self.columns, self.rows, *self.extent()
             )
-        except RasterioError as error:
+        except Exception as error:  # rasterio lets errors of GDAL's own kind through
             reason = str(error).split("\n")[0]
             raise MapError(f"the map cannot be brought onto a plane: {reason}") from None
         return Grid(rows, columns, transform, plane, self.map_crs or self.crs).southward()
