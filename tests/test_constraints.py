@@ -393,6 +393,11 @@ HOLED = tp.Surface.from_grid(np.zeros((12, 12)), NODATA.x, NODATA.y, nodata=NODA
             {"obstacles": [shapely.Point(4, 2)], "radius": 2.5},
             "radius=2.5 to an obstacle: 2;",
         ),
+        (
+            FLAT,
+            {"obstacles": [shapely.GeometryCollection([shapely.Point(4, 2)])], "radius": 2.5},
+            "radius=2.5 to an obstacle: 2;",
+        ),
         (HILLS, {"max_slope": 1}, "degrees, steeper than max_slope=1"),
         (HOLED, {"radius": 0.7, "start": (1, 2.2)}, "radius=0.7 to a no-data cell: 0.2"),
         (HOLED, {"radius": 0.1, "start": (1.9, 0.1)}, "too near to it for radius=0.1"),

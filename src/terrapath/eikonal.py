@@ -361,18 +361,31 @@ def distance_field(
     *,
     bounds: Any = None,
     obstacles: Iterable[Obstacle] = (),
+    radius: float = 0.0,
+    max_slope: float | None = None,
+    keep_in: Any = None,
     spacing: float | None = None,
     watch: Watch | None = None,
 ) -> DistanceField:
     """Distances on the surface from a start to everywhere, by fast marching.
 
-    start : (x1, x2), map units, in free space. bounds, obstacles : as of ``Problem``.
+    start : (x1, x2), map units, in free space.
+    bounds, obstacles, radius, max_slope, keep_in : as of ``Problem``.
     spacing : of the nodes, map units; by default a 250th of the region's
     longer side, or a cell of a finer map.
     watch : now and then called with the number of settled nodes; returning True stops.
     Raises OutsideSurfaceError or InputError, naming the value and the remedy.
     """
-    problem = Problem(surface, start, start, bounds, obstacles)
+    problem = Problem(
+        surface,
+        start,
+        start,
+        bounds,
+        obstacles,
+        radius=radius,
+        max_slope=max_slope,
+        keep_in=keep_in,
+    )
     chosen = default_spacing(problem.bounds, surface.resolution) if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(surface, lattice, problem.free_space)
