@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -243,6 +243,7 @@ class DistanceField:
     """Distances under h from one source, at the nodes of a lattice.
 
     values : (ny, nx), map units, infinite where no path was found on the lattice.
+    problem : what was asked for, where a problem from the source to itself was made of it.
     """
 
     surface: Surface
@@ -250,6 +251,7 @@ class DistanceField:
     source: tuple[float, float]
     medium: Medium
     values: Array
+    problem: Problem | None = None
 
     @property
     def lattice(self) -> Lattice:
@@ -389,4 +391,5 @@ def distance_field(
     chosen = default_spacing(problem.bounds, surface.resolution) if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(surface, lattice, problem.free_space)
-    return march_from(surface, problem.free_space, problem.start, medium, watch=watch)
+    field = march_from(surface, problem.free_space, problem.start, medium, watch=watch)
+    return replace(field, problem=problem)
