@@ -55,7 +55,13 @@ class Problem:
         self.surface = surface
         self.name = name
         self.bounds = self._make_bounds(surface, bounds)
-        given = (obstacles,) if isinstance(obstacles, Obstacle) else tuple(obstacles)
+        try:
+            given = (obstacles,) if isinstance(obstacles, Obstacle) else tuple(obstacles)
+        except TypeError:
+            raise InputError(
+                f"obstacles={obstacles!r} is no list of obstacles; "
+                "give shapely geometries, Circle or Mask"
+            ) from None
         require_not_negative(radius=radius)
         self.obstacles: tuple[Obstacle, ...] = given
         self.radius = float(radius)

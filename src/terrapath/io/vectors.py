@@ -25,12 +25,13 @@ from ..validation import Array, Bounds
 TOLERANCE = 0.01
 MOST_ROUNDS = 12
 MOST_CORNERS = 20_000_000
-# Where along an edge it is looked at how far it bends.
-PLACES = (0.25, 0.5, 0.75)
+# Where along an edge it is looked at how far it bends: no bend is small at both places.
+PLACES = (0.3, 0.6)
 
 # Around the map what is brought along reaches as far as this share of the map's longer side.
 MARGIN = 1.0
 
+FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30
 
 # Formats whose coordinates are said to be WGS 84 whatever they are.
@@ -61,9 +62,10 @@ def read_obstacles(path: str | Path, where: Where) -> list[BaseGeometry]:
     Raises MapError with the file, the reason and the remedy.
     """
     source, plane = Path(path), _Plane.of(where)
-    found = [shape for layer in _layers(source) for shape in _placed(layer, plane)]
+    layers = list(_layers(source))
+    found = [shape for layer in layers for shape in _placed(layer, plane)]
     if plane.bounds is not None:
-        _tell_of_outsiders(source, found, plane.bounds)
+        _tell_of_outsiders(source, found, sum(len(layer.shapes) for layer in layers), plane.bounds)
     return found
 
 
@@ -90,16 +92,23 @@ def read_area(path: str | Path, where: Where) -> BaseGeometry:
 
 
 def _tell(category: type[Warning], text: str) -> None:
-    warnings.warn(text, category, stacklevel=4)
+    warnings.warn(text, category, stacklevel=2)
 
 
-def _tell_of_outsiders(source: Path, shapes: list[BaseGeometry], bounds: Bounds) -> None:
-    inside = shapely.intersects(np.array(shapes, np.object_), shapely.box(*bounds))
-    if not inside.any():
+def _tell_of_outsiders(
+    source: Path, shapes: list[BaseGeometry], count: int, bounds: Bounds
+) -> None:
+    """Where some of the file's obstacles touch no place on the map."""
+    frame = shapely.box(*bounds)
+    shapely.prepare(frame)
+    inside = int(shapely.intersects(frame, np.array(shapes, np.object_)).sum())
+    if inside == 0:
         _tell(
             VectorWarning,
             f"{source}: all obstacles lie outside the map; check the file's CRS and its axis order",
         )
+    elif inside < count:
+        _tell(VectorWarning, f"{source}: {count - inside} of {count} obstacles lie outside the map")
 
 
 # The plane
@@ -207,7 +216,7 @@ def _listed(path: Path) -> tuple[Path, list[str]]:
 def _refuse_absurd_sizes(path: Path) -> None:
     """Before any memory is taken; what is packed counts as it will be unpacked."""
     try:
-        files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path]
+        files = [p for p in path.glob("*") if p.is_file()] if path.is_dir() else [path]
         size = sum(file.stat().st_size for file in files)
         if path.is_file() and zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as archive:
@@ -256,22 +265,23 @@ def _read_layer(path: Path, name: str, *, alone: bool) -> _Layer | None:
         driver = pyogrio.read_info(
             path, layer=name, force_feature_count=False, force_total_bounds=False
         ).get("driver", "")
-        about, _, packed, _ = pyogrio.raw.read(path, layer=name, columns=[], force_2d=True)
+        about, ids, packed, _ = pyogrio.raw.read(
+            path, layer=name, columns=[], force_2d=True, return_fids=True
+        )
         shapes = np.empty(0, np.object_) if packed is None else shapely.from_wkb(packed)
     crs = _parsed(about["crs"], label)
     missing = shapely.is_missing(shapes) | shapely.is_empty(shapes)
-    numbers = np.flatnonzero(~missing).astype(np.int64)
-    if len(numbers) == 0:
+    if missing.all():
         return None
     if missing.any():
         count = int(missing.sum())
         _tell(
             VectorWarning,
-            f"{label}: {count} of {len(shapes)} features have no geometry and are left out, the "
-            f"first is feature {np.flatnonzero(missing)[0]}",
+            f"{label}: without geometry and left out: {count} of {len(shapes)} features, the "
+            f"first is feature {ids[missing][0]}",
         )
-    layer = _Layer(label, driver, crs, shapes[numbers], numbers)
-    _require_finite(layer, "a coordinate that is not finite; mend or remove it")
+    layer = _Layer(label, driver, crs, shapes[~missing], ids[~missing])
+    _require_places(layer, "a coordinate that is not finite, or on no map; mend or remove it")
     return layer
 
 
@@ -284,9 +294,9 @@ def _parsed(crs: Any, label: str) -> CRS | None:
         raise MapError(f"{label}: the CRS is not understood: {_reason(error)}") from None
 
 
-def _require_finite(layer: _Layer, what: str) -> None:
+def _require_places(layer: _Layer, what: str) -> None:
     corners, owners = shapely.get_coordinates(layer.shapes, return_index=True)
-    bad = ~np.isfinite(corners).all(axis=1)
+    bad = ~(np.abs(corners) < FARTHEST).all(axis=1)
     if bad.any():
         raise MapError(f"{layer.label}: feature {layer.numbers[owners[bad][0]]} has {what}")
 
@@ -303,8 +313,8 @@ def _repaired(layer: _Layer) -> _Layer:
     shapes[broken] = [_with_extent(shape) for shape in mended]
     _tell(
         RepairedWarning,
-        f"{layer.label}: {len(broken)} of {len(shapes)} geometries are not valid and were "
-        f"repaired, the first is feature {layer.numbers[broken[0]]}: {reason}",
+        f"{layer.label}: not valid, and repaired: {len(broken)} of {len(shapes)} geometries, the "
+        f"first is feature {layer.numbers[broken[0]]}: {reason}",
     )
     kept = ~shapely.is_empty(shapes)
     return replace(layer, shapes=shapes[kept], numbers=layer.numbers[kept])
@@ -336,16 +346,16 @@ def _placed(layer: _Layer, plane: _Plane) -> list[BaseGeometry]:
             f"{layer.label} is in {crs.name}, which cannot be brought onto {target.name}: "
             f"{_reason(error)}"
         ) from None
-    if region is not None:
-        layer = _clipped(layer, region)
 
     def move(corners: Array) -> Array:
         return np.column_stack(transformer.transform(corners[:, 0], corners[:, 1]))
 
     metres = target.axis_info[0].unit_conversion_factor if target.axis_info else 1.0
-    layer = _with_more_corners(layer, move, TOLERANCE / metres)
-    layer = replace(layer, shapes=np.asarray(shapely.transform(layer.shapes, move)))
-    _require_finite(
+    with _quietly(Path(layer.label)):
+        near = layer if region is None else _clipped(layer, region)
+        near = _with_more_corners(near, move, TOLERANCE / metres)
+        layer = replace(near, shapes=np.asarray(shapely.transform(near.shapes, move)))
+    _require_places(
         layer,
         f"a place that {target.name} does not reach; check the file's CRS, or cut out the part "
         "around the map",
@@ -418,7 +428,7 @@ def _longest_edges(shapes: Geometries, move: Move, tolerance: float) -> Array:
             bend = np.maximum(bend, np.hypot(off[:, 0], off[:, 1]))
     bent = np.isfinite(bend) & (bend > tolerance)
     # A bend shrinks with the square of the edge's length.
-    pieces = np.ceil(1.1 * np.sqrt(bend[bent] / tolerance))
+    pieces = np.ceil(1.2 * np.sqrt(bend[bent] / tolerance))
     lengths = np.hypot(*(b - a)[bent].T) / np.maximum(pieces, 2.0)
     longest = np.full(len(shapes), np.inf)
     np.minimum.at(longest, owner[bent], lengths)
