@@ -13,6 +13,7 @@ from scipy.ndimage import map_coordinates
 
 from ..errors import MapError
 from ..files import written_whole
+from ..free_space import sort_obstacles
 from ..io.routes.profile import slopes
 from ..io.routes.record import via_points
 from ..io.routes.units import height_scale
@@ -28,9 +29,17 @@ ROUTE_POINTS = 5000
 LIFT = 0.004  # how far lines hover over the terrain, as a share of the longer side
 EXAGGERATIONS = (1, 2, 5)
 RELIEF = 0.35  # the exaggeration at first is the largest that keeps to this share of the side
-OBSTACLE_COLOUR, EDGE_COLOUR = "#3b3b3b", "#101010"
+EDGE_COLOUR = "#101010"
+# Why ground is not free, and its colour: as on the maps.
+REASONS = (
+    ("blocked or no data", "#3b3b3b"),
+    ("too steep", "#6b1f85"),
+    ("too near, or outside", "#8f8f8f"),
+)
 # Graphics cards count in 32 bits: far from zero, coordinates are shown from a nearer origin.
 FAR = 1000.0
+STYLE = "<style>body { margin: 0 }</style>"
+CAMERA = {"eye": {"x": -0.55, "y": -1.3, "z": 0.85}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
 # Where a marker is, for the pointer.
 AT = "%{customdata[0]:.10g}, %{customdata[1]:.10g}"
 
@@ -56,7 +65,7 @@ class Stage(NamedTuple):
         terrain = Terrain.sample(problem, SAMPLES)
         return cls(solution, terrain, origin, scale, LIFT * side * scale)
 
-    def drawn(self, points: Array) -> dict[str, Array]:
+    def drawn(self, points: Array, lifts: float = 1.0) -> dict[str, Array]:
         """x, y, z of lines over the terrain: never under its mesh, which is coarser."""
         terrain = self.terrain
         column = (points[:, 0] - terrain.x[0]) / (terrain.x[1] - terrain.x[0])
@@ -64,7 +73,7 @@ class Stage(NamedTuple):
         mesh = map_coordinates(terrain.values[0], [row, column], order=1, mode="nearest")
         heights = self.solution.problem.surface.values(points)[:, 0]
         x, y = (points - self.origin).T
-        return {"x": x, "y": y, "z": np.maximum(mesh, heights) + self.lift}
+        return {"x": x, "y": y, "z": np.maximum(mesh, heights) + lifts * self.lift}
 
 
 def _with_unit(name: str, unit: str) -> str:
@@ -108,22 +117,53 @@ def _terrain_traces(stage: Stage) -> list[Any]:
         name="terrain",
         hovertemplate=f"{hover}<br>slope %{{customdata:.1f}} degrees<extra></extra>",
     )
+    return [ground, *_blocked_traces(stage, place)]
+
+
+def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
+    """Ground that is not free, a little above the other, by the reason; reasons in the legend."""
+    import plotly.graph_objects as go
+
+    terrain = stage.terrain
     if not terrain.blocked.any():
-        return [ground]
+        return []
     over = np.where(terrain.blocked, terrain.values[0] + 0.5 * stage.lift, np.nan)
-    colour = [(0.0, OBSTACLE_COLOUR), (1.0, OBSTACLE_COLOUR)]
-    style = {"showscale": False, "hoverinfo": "skip", "name": "blocked"}
-    return [ground, go.Surface(**place, z=over.astype(np.float32), colorscale=colour, **style)]
+    reason = np.select([terrain.solid, terrain.steep], [0, 1], default=2)
+    last = len(REASONS) - 1
+    blocked = go.Surface(
+        **place,
+        z=over.astype(np.float32),
+        surfacecolor=reason.astype(np.uint8),
+        cmin=0,
+        cmax=last,
+        colorscale=[(k / last, colour) for k, (_, colour) in enumerate(REASONS)],
+        showscale=False,
+        hoverinfo="skip",
+        name="blocked",
+    )
+    keys = [
+        go.Scatter3d(
+            x=[None],
+            y=[None],
+            z=[None],
+            mode="markers",
+            marker={"color": colour, "symbol": "square", "size": 8},
+            name=name,
+        )
+        for k, (name, colour) in enumerate(REASONS)
+        if (terrain.blocked & (reason == k)).any()
+    ]
+    return [blocked, *keys]
 
 
 def _outlines(stage: Stage) -> list[Any]:
-    """Edges of polygons, walls and discs, laid over the terrain as one broken line."""
+    """Edges of polygons, walls and discs as given, laid over the terrain as one broken line."""
     import plotly.graph_objects as go
 
     problem = stage.solution.problem
-    space, bounds = problem.free_space, problem.bounds
-    shapes = [g.boundary if g.geom_type == "Polygon" else g for g in space.geometries]
-    shapes += [shapely.Point(c.x1, c.x2).buffer(c.radius).exterior for c in space.circles]
+    given, bounds = sort_obstacles(problem.constraints.obstacles), problem.bounds
+    shapes = [g.boundary if g.geom_type == "Polygon" else g for g in given.geometries]
+    shapes += [shapely.Point(c.x1, c.x2).buffer(c.radius).exterior for c in given.circles]
     step = max(bounds.width, bounds.height) / SAMPLES
     region = shapely.box(bounds.x1_min, bounds.x2_min, bounds.x1_max, bounds.x2_max)
     pieces = shapely.get_parts(shapely.segmentize(shapely.intersection(shapes, region), step))
@@ -135,7 +175,7 @@ def _outlines(stage: Stage) -> list[Any]:
         axis: np.concatenate([np.append(line[axis], np.nan) for line in drawn]) for axis in "xyz"
     }
     style = {"color": EDGE_COLOUR, "width": 4}
-    return [go.Scatter3d(**broken, mode="lines", line=style, name="obstacles", hoverinfo="skip")]
+    return [go.Scatter3d(**broken, mode="lines", line=style, name="outlines", hoverinfo="skip")]
 
 
 def _thinned(route: Route) -> Any:
@@ -200,7 +240,7 @@ def _marks(stage: Stage) -> list[Any]:
     marks.append(("goal", np.array([problem.goal]), "#ffb000", "diamond"))
     return [
         go.Scatter3d(
-            **stage.drawn(points),
+            **stage.drawn(points, lifts=2.0),
             mode="markers",
             marker={"size": 7, "color": colour, "symbol": symbol, "line": {"width": 1}},
             name=name,
@@ -232,7 +272,8 @@ def _layout(stage: Stage) -> dict[str, Any]:
     solution, bounds = stage.solution, stage.solution.problem.bounds
     surface, heights = solution.problem.surface, stage.terrain.values[0]
     side = max(bounds.width, bounds.height)
-    low, high = float(heights.min()), float(heights.max()) + 2.0 * stage.lift
+    # The floor is a little lower than the ground, or its lines would shine through.
+    low, high = float(heights.min()) - stage.lift, float(heights.max()) + 3.0 * stage.lift
     true = (high - low) / stage.scale / side
     flat = {"x": bounds.width / side, "y": bounds.height / side}
     ratios = [{**flat, "z": k * true} for k in EXAGGERATIONS]
@@ -252,7 +293,10 @@ def _layout(stage: Stage) -> dict[str, Any]:
             "zaxis": {"title": _axis_title(height.name, height.unit, 0.0), "range": [low, high]},
             "aspectmode": "manual",
             "aspectratio": ratios[first],
-            "camera": {"eye": {"x": -0.55, "y": -1.25, "z": 0.85}},
+            "camera": {
+                "eye": {"x": -0.6, "y": -1.4, "z": 0.95},
+                "center": {"x": 0, "y": 0, "z": -0.2},
+            },
         },
         "updatemenus": [
             {
@@ -303,8 +347,12 @@ def plot_page(solution: Solution, path: str | Path) -> None:
     target = Path(path)
     require_known_page(target)
     page = draw_page(solution).to_html(
-        include_plotlyjs=True, include_mathjax=False, full_html=True, div_id="terrapath"
+        include_plotlyjs=True,
+        include_mathjax=False,
+        full_html=True,
+        default_height="100vh",
+        div_id="terrapath",
     )
-    head = f"<head><title>{escape(_title(solution))}</title>"
+    head = f"<head><title>{escape(_title(solution))}</title>{STYLE}"
     with written_whole(target) as temporary:
         temporary.write_text(page.replace("<head>", head, 1), encoding="utf-8", errors="replace")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,13 +22,16 @@ RESERVED = ("fid", "geom")
 
 
 @contextmanager
-def _without_dates() -> Iterator[None]:
+def _quietly_without_dates() -> Iterator[None]:
+    """No stamp of today, and no warning of a plane that has no CRS: it is so."""
     import pyogrio
 
     before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": EPOCH})
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "'crs' was not provided", UserWarning)
+            yield
     finally:
         pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": before})
 
@@ -78,7 +82,7 @@ def write(solution: Solution, file: Path) -> None:
     """
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
-    with tempfile.TemporaryDirectory(prefix="terrapath-") as folder, _without_dates():
+    with tempfile.TemporaryDirectory(prefix="terrapath-") as folder, _quietly_without_dates():
         draft = Path(folder) / "route.gpkg"
         try:
             for name, frame in _layers(solution).items():

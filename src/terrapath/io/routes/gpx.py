@@ -16,7 +16,7 @@ from ...validation import Array
 from .places import DECIMALS, in_degrees
 from .profile import clean
 from .record import via_points
-from .units import metres_per
+from .units import height_metres
 
 
 def require_earth(path: Path, georeference: Georeference | None) -> None:
@@ -32,7 +32,7 @@ def require_earth(path: Path, georeference: Georeference | None) -> None:
 
 def _places(surface: Surface, points: Array) -> list[dict[str, Any]]:
     """Degrees, and metres as GPX asks; no elevation where the unit of heights is not known."""
-    reference, metres = surface.georeference, metres_per(surface.layers[0].unit)
+    reference, metres = surface.georeference, height_metres(surface)
     assert reference is not None
     degrees = np.round(in_degrees(reference, points), DECIMALS).tolist()
     heights = surface.values(points)[:, 0].tolist()
@@ -51,7 +51,7 @@ def _description(solution: Solution) -> str:
     text = f"length {solution.length:.6g} {surface.unit}".rstrip()
     if solution.lower_bound is not None and solution.gap is not None:
         text += f", no path is shorter than {solution.lower_bound:.6g}, gap {solution.gap:.3%}"
-    if metres_per(surface.layers[0].unit) is None:
+    if height_metres(surface) is None:
         text += "; without elevations: the unit of the heights is not known"
     return f"{text}; {solution.planner}, seed {solution.seed}"
 

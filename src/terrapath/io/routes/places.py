@@ -9,6 +9,7 @@ import numpy as np
 from ...errors import MapError
 from ...surface.georeference import Georeference
 from ...validation import Array
+from .units import plane_metres
 
 # Decimals of a degree: a tenth of a millimetre on Earth.
 DECIMALS = 9
@@ -44,7 +45,7 @@ def _unwrapped(lonlat: Array) -> Array:
 
 def following(reference: Georeference, points: Array) -> Array:
     """The points, with more between them where the line through their degrees strays."""
-    metres = reference.crs.axis_info[0].unit_conversion_factor if reference.crs.axis_info else 1.0
+    metres = plane_metres(reference) or 1.0
     for _ in range(ROUNDS):
         lonlat = _unwrapped(in_degrees(reference, points))
         chords = reference.from_lonlat(0.5 * (lonlat[:-1] + lonlat[1:]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -75,7 +75,14 @@ def profile_columns(solution: Solution) -> list[Column]:
         Column("slope", "degrees", found.along),
         Column("ground slope", "degrees", found.ground),
     ]
-    return [*columns, layers[0], *slope, *layers[1:]]
+    return [*columns, layers[0], *slope, *layers[1:], *_cost(surface, profile.points)]
+
+
+def _cost(surface: Any, points: Array) -> list[Column]:
+    """What the cost layers together multiply lengths by, where there are any."""
+    if not getattr(surface, "costs", ()):
+        return []
+    return [Column("cost", "", surface.cost(points))]
 
 
 def clean(text: str) -> str:

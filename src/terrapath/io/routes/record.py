@@ -50,7 +50,11 @@ def provenance(solution: Solution) -> dict[str, Any]:
         "seed": solution.seed,
         "layers": {layer.name: layer.weight for layer in surface.layers},
     }
-    known = {"options": getattr(solution, "options", None), "map": getattr(surface, "source", None)}
+    known = {
+        "costs": {layer.name: layer.weight for layer in getattr(surface, "costs", ())},
+        "options": getattr(solution, "options", None),
+        "map": getattr(surface, "source", None),
+    }
     found |= {key: value for key, value in known.items() if value}
     if surface.georeference is not None:
         found["planned_in"] = surface.georeference.crs.to_string()

@@ -15,7 +15,7 @@ from ...problem import Solution
 from ...surface import Surface
 from ...validation import Array
 from .profile import headings, slopes
-from .units import metres_per
+from .units import height_metres, plane_metres
 
 TOPIC, FRAME = "/plan", "map"
 # The oldest that the library writes: every ROS 2 since Humble reads it.
@@ -33,8 +33,9 @@ def require_library(path: Path) -> None:
 
 
 def positions(surface: Surface, route: Route) -> Array:
-    """(m, 3): the profile's points in metres; units that are not known are taken as they are."""
-    plane, height = metres_per(surface.unit) or 1.0, metres_per(surface.layers[0].unit) or 1.0
+    """(m, 3): the profile's points in metres; heights without a unit count as the plane does."""
+    plane = plane_metres(surface.georeference) or 1.0
+    height = height_metres(surface) or plane
     profile = route.profile
     return np.column_stack([plane * profile.points, height * profile.values[:, 0]])
 
