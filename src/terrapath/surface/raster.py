@@ -106,7 +106,7 @@ class Raster:
     def _fill(self, size: float, kinds: Sequence[str]) -> Cells:
         """Fill small holes, continue the ground into large ones; the cells that stay blocked.
 
-        Costs are filled by their logarithms, so that they stay above 0.
+        Costs are filled by their logarithms and stay within their range, above 0.
         """
         blocked = np.zeros(self.bands.shape[1:], dtype=bool)
         for band, kind in zip(self.bands, kinds, strict=True):
@@ -115,13 +115,13 @@ class Raster:
                 continue
             if kind == "cost":
                 np.log(band, out=band)
+            low, high = np.nanmin(band), np.nanmax(band)
             if size > 0.0:
-                low, high = np.nanmin(band), np.nanmax(band)
                 fill_small_holes(band, missing, self.transform.a, self.transform.e, size)
                 np.clip(band, low, high, out=band)
             continue_into_holes(band, missing)
             if kind == "cost":
-                np.exp(band, out=band)
+                np.exp(np.clip(band, low, high, out=band), out=band)
             blocked |= missing
         return blocked
 
