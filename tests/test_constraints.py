@@ -429,7 +429,11 @@ HOLED = tp.Surface.from_grid(np.zeros((12, 12)), NODATA.x, NODATA.y, nodata=NODA
         ),
         (HILLS, {"max_slope": 1}, "degrees, steeper than max_slope=1"),
         (HOLED, {"radius": 0.7, "start": (1, 2.2)}, "radius=0.7 to a no-data cell: 0.2"),
-        (HOLED, {"radius": 0.1, "start": (1.9, 0.1)}, "too near to it for radius=0.1"),
+        (
+            HOLED,
+            {"radius": 0.1, "start": (1.9, 0.1)},
+            "in the margin that radius=0.1 makes around a no-data cell",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused_with_its_value(surface, options, shown):

@@ -49,8 +49,8 @@ MOST_CELLS_AT_ONCE = 2**22
 class Constraints:
     """All that keeps a path from going somewhere, as it was given, and the vehicle's radius.
 
-    nodata : cells of the surface without data. steep : cells that are too steep. outside : what
-    of the plane is not in the area to keep in, None where there is no such area.
+    nodata : cells of the surface without data. steepness : which of its ground is too steep.
+    outside : what of the plane is not in the area to keep in. Each None where there is none.
     """
 
     bounds: Bounds
@@ -81,14 +81,13 @@ class Constraints:
                 (_distance(obstacle, place), name) for name, obstacle in self._named()
             )
             suffix = f" {unit}" if unit else ""
+            limit = f"radius={self.radius:.6g}{suffix}"
+            distance = f"{_shown(nearest, self.radius)}{suffix}"
             if nearest < self.radius:
-                return (
-                    f"nearer than radius={self.radius:.6g}{suffix} to {name}: "
-                    f"{_shown(nearest, self.radius)}{suffix}"
-                )
+                return f"nearer than {limit} to {name}: {distance}"
             return (
-                f"{_shown(nearest, self.radius)}{suffix} from {name}, too near to it for "
-                f"radius={self.radius:.6g}{suffix} on cells of that size"
+                f"in the margin that {limit} makes around {name}, up to a cell or 0.5 % wider: "
+                f"it is {distance} away"
             )
         return "on the edge of an obstacle"
 
