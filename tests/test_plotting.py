@@ -313,3 +313,18 @@ def test_next_best_routes_and_a_search_without_a_path_have_their_pages(solution,
     assert "found no path" in draw_page(nothing).layout.title.text
     with pytest.raises(tp.MapError, match=r"page\.png.*\.html"):
         plot_page(solution, tmp_path / "page.png")
+
+
+def test_names_of_any_letters_are_drawn(tmp_path):
+    axis = np.linspace(0, 10, 9)
+    values = np.random.default_rng(0).uniform(0, 1, (3, 9, 9))
+    names = ["height", "a $ and $^ of\n\u2028\udc80 <b>", "%{x} $\\frac$"]
+    surface = tp.Surface.from_grid(values, axis, axis, names=names, units=["$", "\x00", "m^2$$"])
+    problem = tp.Problem(surface, (1, 1), (9, 8), name="$\\undefined$ \udc80")
+    path = problem.path([problem.start, problem.goal])
+    solution = tp.Solution(
+        problem=problem, planner="rrt", status=tp.Status.SOLVED, path=path, cost=1.0, seconds=0.0
+    )
+    for plot, name in ((plot_profile, "p.svg"), (plot_route, "r.png"), (plot_page, "p.html")):
+        plot(solution, tmp_path / name)
+    assert "a $ and $^ of" in draw_profile(solution).axes[2].get_ylabel().replace("\\$", "$")

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -558,24 +559,46 @@ def test_a_full_disk_leaves_the_old_file_and_no_rest(ending, tmp_path, monkeypat
     assert [path.name for path in tmp_path.iterdir()] == [target.name]
 
 
+def contents(path):
+    """Bytes by name, of a file or a folder."""
+    return files_of(path) if path.is_dir() else {path.name: path.read_bytes()}
+
+
+@pytest.mark.parametrize("ending", list(WRITERS))
+def test_where_files_may_not_grow_a_route_is_whole_or_not_there(ending, tmp_path):
+    resource = pytest.importorskip("resource")
+    solution = route_on("utm")
+    whole = contents(written(solution, tmp_path, ending))
+    target, largest = tmp_path / f"route{ending}", max(map(len, whole.values()))
+    limit, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ended = []
+    for share in (0.01, 0.2, 0.4, 0.7, 0.9, 0.97, 0.99, 1.0):
+        shutil.rmtree(target) if target.is_dir() else target.unlink(missing_ok=True)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (int(share * largest) + 1, most))
+        try:
+            tp.write_route(solution, target)
+            ended.append("written")
+        except tp.MapError as error:
+            ended.append(str(error))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
+        assert list(tmp_path.iterdir()) == ([target] if ended[-1] == "written" else [])
+        if ended[-1] == "written":
+            assert contents(target) == whole
+    assert ended[-1] == "written"
+    assert all("could not be written" in text for text in ended[:-1])
+
+
 def test_an_unknown_ending_names_those_that_there_are(tmp_path):
     with pytest.raises(tp.MapError, match=r"route\.shp.*\.geojson.*\.gpkg.*\.gpx.*\.bag2"):
         tp.write_route(route_on("utm"), tmp_path / "route.shp")
 
 
-class Legged(tp.Solution):
-    """A solution of several legs, as tours have them."""
-
-    legs = ()
-
-
 def test_via_points_are_waypoints(tmp_path):
     plain = route_on("fiji", count=6)
     points, surface = plain.path.points, plain.problem.surface
-    legs = tuple(tp.Path(surface, points[k : k + 3]) for k in (0, 2))
-    legs = (*legs, solved(surface, points[4:]))
-    solution = Legged(**vars(plain))
-    object.__setattr__(solution, "legs", legs)
+    legs = tuple(solved(surface, points[k : k + 3]) for k in (0, 2, 4))
+    solution = replace(plain, legs=legs)
     via = points[[2, 4]]
     expected = degrees_by_pyproj("fiji", via)
     for ending in WRITERS:

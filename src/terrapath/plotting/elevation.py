@@ -12,6 +12,7 @@ from ..io.routes.record import via_points
 from ..problem import Path, Solution
 from ..validation import Array
 from .map_view import PATH_COLOUR
+from .terrain import with_unit
 
 HEIGHT_COLOUR, GROUND_COLOUR, LIMIT_COLOUR = "#6b5b3e", "#9a9a9a", "#8a2be2"
 LAYER_COLOUR = "#0b6e4f"
@@ -28,7 +29,7 @@ def _draw_height(axes: Any, path: Path) -> None:
     floor = float(values.min()) - 0.08 * spread
     axes.fill_between(profile.distance, floor, values, color=HEIGHT_COLOUR, alpha=0.25, lw=0)
     axes.set_ylim(floor, float(values.max()) + 0.08 * spread)
-    axes.set_ylabel(f"{height.name} ({height.unit})" if height.unit else height.name)
+    axes.set_ylabel(with_unit(height.name, height.unit))
 
 
 def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None) -> None:
@@ -44,13 +45,14 @@ def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None)
     axes.set_ylabel("slope (degrees)")
     axes.legend(fontsize=8, loc="upper right", ncols=3, framealpha=0.85)
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.25 * (high - low))
+    # Room for the limit's line below, and for the legend above.
+    axes.set_ylim(low - 0.04 * (high - low), high + 0.25 * (high - low))
 
 
 def _draw_layer(axes: Any, path: Path, layer: int) -> None:
     shown, profile = path.surface.layers[layer], path.profile
     axes.plot(profile.distance, profile.values[:, layer], color=LAYER_COLOUR, lw=1.2)
-    axes.set_ylabel(f"{shown.name}\n({shown.unit})" if shown.unit else shown.name)
+    axes.set_ylabel(with_unit(shown.name, shown.unit, "\n"))
 
 
 def _mark_vias(axes: Any, solution: Solution, path: Path) -> None:

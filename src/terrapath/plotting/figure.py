@@ -16,7 +16,7 @@ from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
 from .map_view import draw_map
 from .perspective import draw_perspective
-from .terrain import format_length
+from .terrain import format_length, in_words
 
 DOTS_PER_INCH = 140
 PANEL_WIDTH = 5.4  # inches
@@ -27,7 +27,7 @@ FORMATS = (".png", ".svg", ".pdf", ".jpg")
 def _title(solution: Solution) -> str:
     problem = solution.problem
     unit, length = problem.surface.unit, solution.length
-    name = f"{problem.name}: " if problem.name else ""
+    name = f"{in_words(problem.name)}: " if problem.name else ""
     if length is None:
         return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
     saved = 1.0 - length / problem.straight_length if problem.straight_length else 0.0

@@ -14,7 +14,7 @@ from scipy.ndimage import map_coordinates
 from ..errors import MapError
 from ..files import written_whole
 from ..free_space import sort_obstacles
-from ..io.routes.profile import slopes
+from ..io.routes.profile import clean, slopes
 from ..io.routes.record import via_points
 from ..io.routes.units import height_scale
 from ..problem import Path as Route
@@ -76,12 +76,17 @@ class Stage(NamedTuple):
         return {"x": x, "y": y, "z": np.maximum(mesh, heights) + lifts * self.lift}
 
 
+def _shown(text: str) -> str:
+    """A name from a file: neither markup nor letters that cannot be written."""
+    return escape(clean(text))
+
+
 def _with_unit(name: str, unit: str) -> str:
-    return escape(f"{name} ({unit})" if unit else name)
+    return _shown(f"{name} ({unit})" if unit else name)
 
 
 def _suffix(unit: str) -> str:
-    return f" {escape(unit)}" if unit else ""
+    return f" {_shown(unit)}" if unit else ""
 
 
 def _colour_scale(layer: int) -> list[tuple[float, str]] | str:
@@ -102,9 +107,9 @@ def _terrain_traces(stage: Stage) -> list[Any]:
     gradients = height_scale(surface) * surface.gradients(points)[..., 0, :]
     steepness = np.degrees(np.arctan(np.hypot(gradients[..., 0], gradients[..., 1])))
     place: dict[str, Any] = {"x": terrain.x - stage.origin[0], "y": terrain.y - stage.origin[1]}
-    hover = f"{escape(height.name)} %{{z:.6g}}{_suffix(height.unit)}"
+    hover = f"{_shown(height.name)} %{{z:.6g}}{_suffix(height.unit)}"
     if layer > 0:
-        hover += f"<br>{escape(shown.name)} %{{surfacecolor:.6g}}{_suffix(shown.unit)}"
+        hover += f"<br>{_shown(shown.name)} %{{surfacecolor:.6g}}{_suffix(shown.unit)}"
     ground = go.Surface(
         **place,
         z=terrain.values[0].astype(np.float32),
@@ -202,7 +207,7 @@ def _route_traces(stage: Stage) -> list[Any]:
     told = np.column_stack([told, profile.points])[kept]
     template = (
         f"distance %{{customdata[0]:.6g}}{_suffix(unit)}"
-        f"<br>{escape(height.name)} %{{customdata[1]:.6g}}{_suffix(height.unit)}"
+        f"<br>{_shown(height.name)} %{{customdata[1]:.6g}}{_suffix(height.unit)}"
         "<br>slope %{customdata[2]:.1f} degrees, of the ground %{customdata[3]:.1f}"
         "<br>at %{customdata[4]:.10g}, %{customdata[5]:.10g}<extra></extra>"
     )
@@ -242,7 +247,12 @@ def _marks(stage: Stage) -> list[Any]:
         go.Scatter3d(
             **stage.drawn(points, lifts=2.0),
             mode="markers",
-            marker={"size": 7, "color": colour, "symbol": symbol, "line": {"width": 1}},
+            marker={
+                "size": 5 if name == "via" else 7,
+                "color": colour,
+                "symbol": symbol,
+                "line": {"width": 1},
+            },
             name=name,
             customdata=points,
             hovertemplate=f"{name}, {AT}<extra></extra>",
@@ -286,7 +296,7 @@ def _layout(stage: Stage) -> dict[str, Any]:
     ranges = [[bounds.x1_min - west, bounds.x1_max - west], [bounds.x2_min - south] * 2]
     ranges[1][1] = bounds.x2_max - south
     return {
-        "title": {"text": escape(_title(solution)), "font": {"size": 16}},
+        "title": {"text": _shown(_title(solution)), "font": {"size": 16}},
         "scene": {
             "xaxis": {"title": _axis_title("x1", unit, west), "range": ranges[0]},
             "yaxis": {"title": _axis_title("x2", unit, south), "range": ranges[1]},
@@ -353,6 +363,6 @@ def plot_page(solution: Solution, path: str | Path) -> None:
         default_height="100vh",
         div_id="terrapath",
     )
-    head = f"<head><title>{escape(_title(solution))}</title>{STYLE}"
+    head = f"<head><title>{_shown(_title(solution))}</title>{STYLE}"
     with written_whole(target) as temporary:
-        temporary.write_text(page.replace("<head>", head, 1), encoding="utf-8", errors="replace")
+        temporary.write_text(page.replace("<head>", head, 1), encoding="utf-8")

@@ -15,6 +15,7 @@ from matplotlib.colors import LightSource, Normalize
 from matplotlib.ticker import FuncFormatter
 
 from ..free_space import Circle, sort_obstacles
+from ..io.routes.profile import clean
 from ..problem import Problem
 from ..surface import Mask
 from ..validation import Array
@@ -112,7 +113,7 @@ class Terrain:
     def label(self, layer: int) -> str:
         """Name and unit of a layer."""
         shown = self.problem.surface.layers[layer]
-        return f"{shown.name} ({shown.unit})" if shown.unit else shown.name
+        return with_unit(shown.name, shown.unit)
 
     def norm(self, layer: int) -> Normalize:
         """Colour scale over the part of a layer that is not blocked."""
@@ -141,6 +142,16 @@ class Terrain:
             dy=-float(self.y[1] - self.y[0]),
         )
         return np.clip(np.asarray(lit, np.float64), 0.0, 1.0)
+
+
+def in_words(text: str) -> str:
+    """A name that came with a map, for matplotlib, to which dollar signs are mathematics."""
+    return clean(text).replace("$", r"\$")
+
+
+def with_unit(name: str, unit: str, gap: str = " ") -> str:
+    """A name with its unit, as axes show it."""
+    return f"{in_words(name)}{gap}({in_words(unit)})" if unit else in_words(name)
 
 
 def height_colours() -> Any:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import sqlite3
 import tempfile
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from .record import dump, summary, via_points
 
 # GDAL stamps a file with the day it is written; the same route should give the same bytes.
 EPOCH = "1970-01-01T00:00:00.000Z"
+# No index of places: routes are small, and an index is one more thing that a full disk cuts off.
+PLAIN = {"SPATIAL_INDEX": "NO"}
 # Names of columns that are GDAL's own.
 RESERVED = ("fid", "geom")
 
@@ -85,8 +88,29 @@ def write(solution: Solution, file: Path) -> None:
     with tempfile.TemporaryDirectory(prefix="terrapath-") as folder, _quietly_without_dates():
         draft = Path(folder) / "route.gpkg"
         try:
-            for name, frame in _layers(solution).items():
-                frame.to_file(draft, layer=name, driver="GPKG", engine="pyogrio")
+            layers = _layers(solution)
+            for name, frame in layers.items():
+                frame.to_file(draft, layer=name, driver="GPKG", engine="pyogrio", **PLAIN)
         except (DataLayerError, DataSourceError, FeatureError) as error:
             raise OSError(str(error).split("\n")[0]) from error
+        _require_whole(draft, {name: len(frame) for name, frame in layers.items()})
         file.write_bytes(draft.read_bytes())
+
+
+def _require_whole(draft: Path, counts: Mapping[str, int]) -> None:
+    """Raise OSError where the last of a file is missing: GDAL does not tell what fails at closing.
+
+    Then SQLite finds a fault, or what is written last is missing: extents and counts, and the
+    triggers that keep counts, of which each layer has as many as any other.
+    """
+    found = "SELECT table_name, feature_count FROM gpkg_contents NATURAL JOIN gpkg_ogr_contents"
+    triggers = "SELECT count(*) FROM sqlite_master WHERE type = 'trigger' AND tbl_name = ?"
+    try:
+        with closing(sqlite3.connect(draft)) as database:
+            (verdict,) = database.execute("PRAGMA integrity_check").fetchone()
+            whole = dict(database.execute(f"{found} WHERE min_x IS NOT NULL")) == counts
+            whole &= len({database.execute(triggers, [name]).fetchone() for name in counts}) == 1
+    except sqlite3.Error as error:
+        raise OSError(str(error)) from error
+    if verdict != "ok" or not whole:
+        raise OSError("its last part could not be stored; is the disk full?")

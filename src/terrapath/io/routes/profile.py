@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -86,9 +85,8 @@ def _cost(surface: Any, points: Array) -> list[Column]:
 
 
 def clean(text: str) -> str:
-    """On one line, and in letters that UTF-8 can hold."""
-    one_line = re.sub(r"[\x00-\x1f\x7f]+", " ", text)
-    return one_line.encode("utf-8", "replace").decode("utf-8").strip()
+    """On one line, and without letters that no file or screen can show."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 def distinct(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:

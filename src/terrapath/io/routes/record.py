@@ -76,6 +76,23 @@ def _ends_in_degrees(solution: Solution) -> dict[str, Any]:
     }
 
 
+def _measures(solution: Solution) -> dict[str, Any]:
+    """How it ended, how long the route is, and how good."""
+    path = solution.path
+    return {
+        "status": solution.status.value,
+        "length": solution.length,
+        "unrefined_length": None if solution.unrefined is None else solution.unrefined.length,
+        "cost": solution.cost,
+        "lower_bound": solution.lower_bound,
+        "gap": solution.gap,
+        "climb": None if path is None else path.climb,
+        "straight_length": solution.problem.straight_length,
+        "contributions": getattr(path, "contributions", None),
+        "unit": solution.problem.surface.unit,
+    }
+
+
 def route_record(solution: Solution) -> dict[str, Any]:
     """All that is known of a solution, ready for JSON.
 
@@ -87,21 +104,12 @@ def route_record(solution: Solution) -> dict[str, Any]:
     """
     problem, path = solution.problem, solution.path
     record: dict[str, Any] = {
-        "status": solution.status.value,
-        "length": solution.length,
-        "unrefined_length": None if solution.unrefined is None else solution.unrefined.length,
-        "cost": solution.cost,
-        "lower_bound": solution.lower_bound,
-        "gap": solution.gap,
+        **_measures(solution),
         "seconds": solution.seconds,
         "start": problem.start,
         "goal": problem.goal,
         "via": via_points(solution),
         "path": None if path is None else path.points,
-        "straight_length": problem.straight_length,
-        "climb": None if path is None else path.climb,
-        "contributions": getattr(path, "contributions", None),
-        "unit": problem.surface.unit,
         "stopped_by": solution.stopped_by,
         "counters": solution.counters,
         "alternatives": [other.length for other in solution.alternatives],
@@ -111,24 +119,9 @@ def route_record(solution: Solution) -> dict[str, Any]:
     return dict(plain(record))
 
 
-SUMMARY = (
-    "status",
-    "length",
-    "unrefined_length",
-    "cost",
-    "lower_bound",
-    "gap",
-    "climb",
-    "straight_length",
-    "contributions",
-    "unit",
-)
-
-
 def summary(solution: Solution) -> dict[str, Any]:
     """What is known of a route but its points: measures and provenance."""
-    record = route_record(solution)
-    return {key: record[key] for key in (*SUMMARY, *provenance(solution))}
+    return dict(plain({**_measures(solution), **provenance(solution)}))
 
 
 def write_json(solution: Solution, file: Path) -> None:

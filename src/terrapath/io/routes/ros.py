@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
@@ -79,7 +80,6 @@ def _message(solution: Solution, types: Any) -> Any:
 
 def write(solution: Solution, folder: Path) -> None:
     """A bag in a folder that does not exist yet."""
-    import apsw
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.rosbag2.errors import WriterError
     from rosbags.typesys import Stores, get_typestore
@@ -91,5 +91,5 @@ def write(solution: Solution, folder: Path) -> None:
         with Writer(folder, version=BAG_VERSION, storage_plugin=StoragePlugin.SQLITE3) as bag:
             connection = bag.add_connection(TOPIC, kind, typestore=store)
             bag.write(connection, STAMP, store.serialize_cdr(message, kind))
-    except (WriterError, apsw.Error) as error:
+    except (WriterError, sqlite3.Error) as error:
         raise OSError(str(error)) from error
