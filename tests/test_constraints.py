@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,8 @@ BOUNDS = (0.0, 0.0, SIDE, SIDE)
 FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
 HILLS = tp.Surface.from_peaks([[(2.0, 0.3, 3.0, 4.0), (-1.5, 0.2, 7.0, 6.0)]])
 SCENES = 500
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
 
 # What shapely itself may err by, as a share of the radius.
 ROUNDING = 1e-12
@@ -310,9 +313,35 @@ def test_a_route_on_a_real_map_keeps_to_the_slope_by_horn_and_by_differences():
     for gx, gy in ((across, along), (horn_x, horn_y)):
         slopes = np.degrees(np.arctan(np.hypot(gx, gy)))
         assert slopes[j, i].max() <= 25.0
-        assert slopes.max() > 35.0
+        assert slopes.max() > 30.0
     own = np.degrees(np.arctan(np.hypot(*surface.gradients(points)[:, 0].T)))
     assert own.max() <= 25.0 + 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "band", "limit", "start", "goal"),
+    [
+        ("herodotus_mons.tif", 2, 14.0, (-5_000, -3_000), (5_000, 3_000)),
+        ("aristarchus_plateau.tif", 3, 12.0, (-20_000, -20_000), (20_000, 18_000)),
+    ],
+)
+def test_routes_on_the_moon_keep_to_the_slope_by_the_raster(name, band, limit, start, goal):
+    import rasterio
+
+    if not (DATA / name).exists():
+        pytest.skip("the lunar maps are not here")
+    surface = tp.read_surface(DATA / name, height_band=band)
+    steep = {}
+    for max_slope in (limit, None):
+        problem = tp.Problem(surface, start, goal, max_slope=max_slope)
+        points = tp.plan(problem, "fast-marching", refine=True).path.profile.points
+        with rasterio.open(DATA / name) as raster:
+            heights = raster.read(band, masked=True).astype(float).filled(np.nan)
+            rows, columns = rasterio.transform.rowcol(raster.transform, *points.T)
+            along, across = np.gradient(heights, raster.res[0])
+        slopes = np.degrees(np.arctan(np.hypot(along, across)))
+        steep[max_slope] = slopes[rows, columns].max()
+    assert steep[limit] <= limit < steep[None]
 
 
 def test_heights_in_feet_on_a_plane_in_metres_are_compared_in_metres():
@@ -393,9 +422,18 @@ HOLED = tp.Surface.from_grid(np.zeros((12, 12)), NODATA.x, NODATA.y, nodata=NODA
             {"obstacles": [shapely.Point(4, 2)], "radius": 2.5},
             "radius=2.5 to an obstacle: 2;",
         ),
+        (
+            FLAT,
+            {"obstacles": [shapely.GeometryCollection([shapely.Point(4, 2)])], "radius": 2.5},
+            "radius=2.5 to an obstacle: 2;",
+        ),
         (HILLS, {"max_slope": 1}, "degrees, steeper than max_slope=1"),
         (HOLED, {"radius": 0.7, "start": (1, 2.2)}, "radius=0.7 to a no-data cell: 0.2"),
-        (HOLED, {"radius": 0.1, "start": (1.9, 0.1)}, "too near to it for radius=0.1"),
+        (
+            HOLED,
+            {"radius": 0.1, "start": (1.9, 0.1)},
+            "in the margin that radius=0.1 makes around a no-data cell",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused_with_its_value(surface, options, shown):

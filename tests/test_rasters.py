@@ -35,7 +35,7 @@ def write(path, bands, transform=NORTH_UP, crs=UTM, units=(), **profile):
     with rasterio.open(
         path,
         "w",
-        driver="GTiff",
+        driver=profile.pop("driver", "GTiff"),
         count=len(bands),
         height=bands.shape[1],
         width=bands.shape[2],
@@ -417,7 +417,8 @@ def test_a_projected_map_is_planned_in_its_own_crs(tmp_path):
 
 
 def test_heights_without_a_unit_are_metres_only_on_a_plane_in_metres(tmp_path):
-    feet = write(tmp_path / "feet.tif", HEIGHTS, crs="EPSG:2225")
+    transform = Affine(10.0, 0.0, 6.5e6, 0.0, -10.0, 2e6)
+    feet = write(tmp_path / "feet.tif", HEIGHTS, transform, "EPSG:2225")
     surface = tp.read_surface(feet)
     assert surface.unit == "ft"
     assert surface.layers[0].unit == "ft"

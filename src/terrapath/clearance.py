@@ -18,7 +18,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from .errors import InputError
-from .free_space import Circle, FreeSpace, Geometries, Obstacle, sort_obstacles
+from .free_space import POINTS, Circle, FreeSpace, Geometries, Obstacle, sort_obstacles
 from .separation import merged_masks
 from .steepness import Steepness
 from .surface import Mask
@@ -28,7 +28,6 @@ from .validation import Array, Bounds
 # span half as much again, and by that angle the buffer is made wider: 0.5 % at most.
 QUARTER_EDGES = 12
 WIDEST_EDGE = 1.5 * 0.5 * math.pi / QUARTER_EDGES
-POINT_TYPES = (0, 4)  # shapely's type ids
 
 # The clearance is larger than the radius by this share of it, and of the largest coordinate:
 # far above rounding, far below anything on a map.
@@ -50,8 +49,8 @@ MOST_CELLS_AT_ONCE = 2**22
 class Constraints:
     """All that keeps a path from going somewhere, as it was given, and the vehicle's radius.
 
-    nodata : cells of the surface without data. steep : cells that are too steep. outside : what
-    of the plane is not in the area to keep in, None where there is no such area.
+    nodata : cells of the surface without data. steepness : which of its ground is too steep.
+    outside : what of the plane is not in the area to keep in. Each None where there is none.
     """
 
     bounds: Bounds
@@ -82,22 +81,23 @@ class Constraints:
                 (_distance(obstacle, place), name) for name, obstacle in self._named()
             )
             suffix = f" {unit}" if unit else ""
+            limit = f"radius={self.radius:.6g}{suffix}"
+            distance = f"{_shown(nearest, self.radius)}{suffix}"
             if nearest < self.radius:
-                return (
-                    f"nearer than radius={self.radius:.6g}{suffix} to {name}: "
-                    f"{_shown(nearest, self.radius)}{suffix}"
-                )
+                return f"nearer than {limit} to {name}: {distance}"
             return (
-                f"{_shown(nearest, self.radius)}{suffix} from {name}, too near to it for "
-                f"radius={self.radius:.6g}{suffix} on cells of that size"
+                f"in the margin that {limit} makes around {name}, up to a cell or 0.5 % wider: "
+                f"it is {distance} away"
             )
         return "on the edge of an obstacle"
 
     def _blocker_within(self, point: tuple[float, float]) -> str | None:
         """The obstacle that holds the point itself."""
-        masks = [] if self.nodata is None else [self.nodata]
-        with_width = [g for g in self.obstacles if not _is_point(g)]
-        if blocker := FreeSpace(self.bounds, [*with_width, *masks]).blocker(point):
+        parts = sort_obstacles(self.obstacles)
+        with_width = parts.geometries[~_are_points(parts.geometries)]
+        masks = parts.masks if self.nodata is None else [*parts.masks, self.nodata]
+        given = FreeSpace(self.bounds, [*with_width, *parts.circles, *masks])
+        if blocker := given.blocker(point):
             return blocker
         if self.outside is not None and shapely.intersects_xy(self.outside, *point):
             return "outside the area of keep_in, or on its edge"
@@ -122,8 +122,8 @@ def _shown(distance: float, radius: float) -> str:
     return f"{distance:.{digits}g}"
 
 
-def _is_point(obstacle: Obstacle) -> bool:
-    return isinstance(obstacle, BaseGeometry) and obstacle.geom_type in {"Point", "MultiPoint"}
+def _are_points(geometries: Geometries) -> Any:
+    return np.isin(shapely.get_type_id(geometries), POINTS)
 
 
 def _distance(obstacle: Obstacle, point: shapely.Point) -> float:
@@ -207,7 +207,7 @@ def inflated(obstacles: Sequence[Obstacle], radius: float, bounds: Bounds) -> li
     reach = radius * (1.0 + EXCESS) + ROUNDING * largest
     near = _are_near(extents, bounds, 2.0 * reach)
     geometries = parts.geometries[near]
-    is_point = np.isin(shapely.get_type_id(geometries), POINT_TYPES)
+    is_point = _are_points(geometries)
     corners = shapely.get_coordinates(geometries[is_point])
     discs = [Circle(float(x), float(y), reach) for x, y in corners]
     discs += [Circle(disc.x1, disc.x2, disc.radius + reach) for disc in parts.circles]

@@ -483,6 +483,15 @@ class Scenario:
     planner: PlannerSection = field(default_factory=PlannerSection)
     output: OutputSection = field(default_factory=OutputSection)
 
+    def files(self) -> Iterator[str]:
+        """All files that are named, to be read or written."""
+        for entry in options():
+            value = getattr(getattr(self, entry.section), entry.key)
+            if entry.option.is_file and value:
+                yield from [value] if isinstance(value, str) else value
+        for table in (*self.map.layers.values(), *self.map.costs.values()):
+            yield table.file
+
     def overridden(self, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
         """With the values given, by section and key; tables are merged name by name."""
         changed = {}

@@ -39,7 +39,7 @@ _METRES = {
     "ft": 0.3048,
     "foot": 0.3048,
     "feet": 0.3048,
-    "US survey foot": 1200.0 / 3937.0,
+    "us survey foot": 1200.0 / 3937.0,
     "us-ft": 1200.0 / 3937.0,
 }
 
@@ -50,8 +50,9 @@ class Steepness:
 
     The surface's cells are those around the knots of its spline, which for a map are the map's
     own; exact peaks are cut into cells finer than any of them.
-    A cell's slope is the largest of: the surface's own at 5 x 5 places of the cell; Horn's
-    estimate from the eight neighbours; and the difference of its two neighbours along each axis.
+    A cell's slope is the largest of the surface's own at 5 x 5 places of the cell and, on a
+    spline, of Horn's estimate from the eight neighbours and the differences of those along
+    each axis.
     """
 
     surface: Surface
@@ -69,7 +70,7 @@ class Steepness:
     @cached_property
     def _scale(self) -> float:
         """Units of the plane in one of height."""
-        plane, height = self.surface.unit, self.surface.layers[0].unit
+        plane, height = self.surface.unit.lower(), self.surface.layers[0].unit.lower()
         if plane == height or not plane or not height:
             return 1.0
         if plane not in _METRES or height not in _METRES:

@@ -25,9 +25,14 @@ def scenario_of(where: str, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
     if is_scenario(where):
         from ..io.scenario import read_scenario
 
-        return read_scenario(where).overridden(given)
-    place = MapSection(scene=where) if where in SCENES else MapSection(path=where)
-    return Scenario(map=place).overridden(given)
+        scenario = read_scenario(where)
+    else:
+        place = MapSection(scene=where) if where in SCENES else MapSection(path=where)
+        scenario = Scenario(map=place)
+    asked = scenario.overridden(given)
+    for file in asked.files():
+        _exists(Path(file))
+    return asked
 
 
 class Place(NamedTuple):
@@ -173,10 +178,12 @@ def read_options(asked: MapSection) -> dict[str, Any]:
 
 
 def _exists(path: Path) -> bool:
+    """Raises InputError for a name that no file can have."""
     try:
         return path.exists()
-    except (OSError, ValueError):
-        return False
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{str(path)[:60]!r} cannot be a file: {reason}; check the path") from None
 
 
 # Coordinates

@@ -16,7 +16,7 @@ from ..surface.georeference import parse_crs
 from ..surface.grid import Grid
 from ..validation import Array, as_array
 from .bands import Band
-from .rasters import HEIGHT_NAMES, with_crs
+from .rasters import HEIGHT_NAMES, reading, with_crs
 
 X_NAMES = ("x", "lon", "longitude", "easting", "eastings", "east", "projection_x_coordinate")
 Y_NAMES = ("y", "lat", "latitude", "northing", "northings", "north", "projection_y_coordinate")
@@ -35,8 +35,10 @@ class ArrayBand(Band):
 
     def read(self, rows: slice, columns: slice) -> Array:
         """Values (rows, columns) with scale and offset applied, NaN where there is no data."""
-        part = self.array[rows, columns]
-        stored = np.ma.filled(np.ma.asarray(getattr(part, "values", part)).astype(float), np.nan)
+        with reading(self.label, is_file=False):  # an xarray object reads its file only now
+            part = self.array[rows, columns]
+            part = np.ma.asarray(getattr(part, "values", part))
+        stored = np.ma.filled(part.astype(float), np.nan)
         values: Array = np.array(stored, dtype=np.float64)
         for value in self.no_data:
             values[values == value] = np.nan
@@ -62,10 +64,14 @@ def band_of_numpy(source: tuple[Any, Any, Any], crs: CRS | None) -> ArrayBand:
     return _on_axes(array, x, y, crs, label="the array", unit="")
 
 
-def band_of_xarray(source: Any, which: int | str, crs: CRS | None) -> ArrayBand:
-    """A variable of a Dataset or a band of a DataArray; which : 1-based number, or the name."""
+def band_of_xarray(source: Any, which: int | str, crs: CRS | None, *, label: str = "") -> ArrayBand:
+    """A variable of a Dataset or a band of a DataArray; which : 1-based number, or the name.
+
+    label : what messages call it; by default the array's name.
+    """
     array, which = _variable(source, which) if hasattr(source, "data_vars") else (source, which)
-    label = f"the array {array.name!r}" if array.name is not None else "the array"
+    if not label:
+        label = f"the array {array.name!r}" if array.name is not None else "the array"
     _require_numbers(array.dtype, label)
     x, y = (_dimension(array, axis, label) for axis in ("x", "y"))
     array = _plane(array, x, y, which, label).transpose(y, x)
@@ -215,9 +221,9 @@ def _crs(source: Any, array: Any, x: Hashable, y: Hashable) -> CRS | None:
     ):
         attributes = array[dimension].attrs if dimension in array.coords else {}
         units = str(attributes.get("units", "")).lower()
-        if not (units.startswith("degree") and units.endswith(toward)):
-            if str(dimension).lower() not in names or units not in {"", *DEGREES}:
-                return None
+        by_name = str(dimension).lower() in names and units in {"", *DEGREES}
+        if not by_name and not (units.startswith("degree") and units.endswith(toward)):
+            return None
     return CRS.from_epsg(4326)
 
 

@@ -15,7 +15,7 @@ from ..surface.grid import Grid
 from ..surface.smoothing import BLOCK
 from ..validation import Array, Bounds
 
-MARGIN = 4  # cells around a window, for the spline
+MARGIN = 8  # cells around a window: what lies beyond moves the spline by 1e-4 of itself
 SAMPLED_STRIPS = 8
 SAMPLED_ROWS = 16
 LEAST_SHARE = 0.5  # of a coarse cell that must have data

@@ -23,7 +23,7 @@ from ..surface.smoothing import blocks, quantisation_step, scale_for_step
 from ..validation import Array, as_bounds, require_count, require_not_negative
 from .arrays import band_of_numpy, band_of_xarray, is_xarray
 from .bands import Band, View
-from .rasters import gdal, open_band
+from .rasters import classic_netcdf, gdal, open_band, open_classic_netcdf, reading
 
 _SOURCE = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?", re.DOTALL)
 
@@ -81,8 +81,8 @@ class LayerSource:
 
 
 def _as_path(text: str) -> Path | str:
-    """A Path, or the text where GDAL reads it as something else."""
-    return text if "://" in text else Path(text)
+    """A Path, or the text where GDAL reads it as something else: a Path drops slashes."""
+    return text if "://" in text or text.startswith("/vsi") else Path(text)
 
 
 class _Part(NamedTuple):
@@ -108,6 +108,11 @@ def _open(source: LayerSource, files: ExitStack, crs: CRS | None, *, heights: bo
         raise InputError(
             f"source {shown:.60} is not a map; give a path, an xarray object, or (values, x, y)"
         )
+    if (classic := classic_netcdf(place)) is not None:
+        file, variable = classic
+        dataset = open_classic_netcdf(file, files)
+        with reading(place):
+            return band_of_xarray(dataset, variable or band, crs, label=str(place))
     return open_band(place, band, files, crs=crs, heights=heights)
 
 
@@ -175,7 +180,7 @@ def _view_onto(part: _Part, base: View, target: Grid) -> View:
     return view.around(x, y) or view
 
 
-def _onto(view: View, target: Grid, out: Array, *, linear: bool) -> None:
+def _onto(view: View, target: Grid, out: Array) -> None:
     """What is seen of a band on the target's cells: read straight where they are the same."""
     grid = view.grid
     same_crs = grid.crs == target.crs
@@ -184,7 +189,16 @@ def _onto(view: View, target: Grid, out: Array, *, linear: bool) -> None:
     elif same_crs and grid.flipped().is_same(target):
         view.read_into(out[::-1])
     else:
-        resample(_read(view), grid, target, out, linear=linear)
+        resample(_read(view), grid, target, out, linear=False)
+
+
+def _costs_onto(name: str, view: View, target: Grid, out: Array) -> None:
+    """Costs on the target's cells, within the range that they have: logarithms, bilinear."""
+    values = _read(view)
+    _require_costs(name, values, view.grid)
+    np.log(values, out=values)
+    resample(values, view.grid, target, out, linear=True)
+    np.exp(out, out=out)
 
 
 def _base_view(band: Band, within: Any, decimate: int, most_cells: int) -> View:
@@ -209,15 +223,15 @@ def _into_plane_unit(unit: str, plane: str) -> tuple[float, str]:
     return (1.0 if abs(factor - 1.0) < 1e-12 else factor), plane
 
 
-def _require_costs(part: _Part, values: Array, target: Grid) -> None:
+def _require_costs(name: str, values: Array, grid: Grid) -> None:
     """Raise MapError with the place of a cost that is not above 0."""
-    for rows in blocks(target.rows, target.columns):
+    for rows in blocks(grid.rows, grid.columns):
         wrong = np.argwhere(values[rows] <= 0.0)
         if len(wrong):
             row, column = wrong[0]
-            x, y = target.place(column + 0.5, rows.start + row + 0.5)
+            x, y = grid.place(column + 0.5, rows.start + row + 0.5)
             raise MapError(
-                f"cost {part.name!r} is {values[rows.start + row, column]:g} at x={x:.10g}, "
+                f"cost {name!r} is {values[rows.start + row, column]:g} at x={x:.10g}, "
                 f"y={y:.10g}; costs multiply lengths and must be above 0: mark forbidden ground as "
                 "no-data, and raise the rest"
             )
@@ -315,7 +329,8 @@ def _read_all(parts: list[_Part], base: View, target: Grid, most_cells: int) -> 
         view.require_size(most_cells)
     bands = np.empty((len(parts), target.rows, target.columns))
     for part, view, out in zip(parts, views, bands, strict=True):
-        _onto(view, target, out, linear=part.kind == "cost")
         if part.kind == "cost":
-            _require_costs(part, out, target)
+            _costs_onto(part.name, view, target, out)
+        else:
+            _onto(view, target, out)
     return bands

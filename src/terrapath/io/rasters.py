@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,8 +28,8 @@ SECONDS_FOR_NETWORK = 30
 
 # What a variable of heights is called, the likeliest first.
 HEIGHT_NAMES = (
-    "height", "heights", "elevation", "elev", "dem", "dtm", "altitude", "orog", "topo", "topography",
-    "surface_altitude", "band1", "z",
+    "height", "heights", "elevation", "elev", "dem", "dtm", "altitude", "orog", "topo",
+    "topography", "surface_altitude", "band1", "z",
 )  # fmt: skip
 
 
@@ -41,6 +42,7 @@ def gdal() -> Iterator[None]:
     logging.getLogger("rasterio").addHandler(logging.NullHandler())
     with (
         warnings.catch_warnings(),
+        _without_broken_messages(),
         rasterio.Env(GDAL_CACHEMAX=CACHE_MEGABYTES, GDAL_HTTP_TIMEOUT=SECONDS_FOR_NETWORK),
     ):
         warnings.simplefilter("ignore")
@@ -48,19 +50,42 @@ def gdal() -> Iterator[None]:
 
 
 @contextmanager
-def _reading(path: str | Path) -> Iterator[None]:
-    """Turn what goes wrong inside into one line that names the file."""
+def _without_broken_messages() -> Iterator[None]:
+    """Silence where a message of GDAL is no text: rasterio cannot log it, and prints that.
+
+    It does so by both hooks of the interpreter, from within a callback of GDAL.
+    """
+    uncaught, unraisable = sys.excepthook, sys.unraisablehook
+
+    def of_uncaught(kind: Any, error: Any, trace: Any) -> None:
+        if not issubclass(kind, UnicodeDecodeError):
+            uncaught(kind, error, trace)
+
+    def of_unraisable(what: Any) -> None:
+        if "rasterio" not in str(what.object):
+            unraisable(what)
+
+    sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable
+    try:
+        yield
+    finally:
+        sys.excepthook, sys.unraisablehook = uncaught, unraisable
+
+
+@contextmanager
+def reading(path: str | Path, *, is_file: bool = True) -> Iterator[None]:
+    """Turn what goes wrong inside into one line that names the file, or the array."""
     try:
         yield
     except TerrapathError:
         raise
     except Exception as error:  # damaged files raise whatever GDAL, rasterio or NumPy do
-        raise _unreadable(path, error) from None
+        raise _unreadable(path, error, is_file=is_file) from None
 
 
-def _unreadable(path: str | Path, error: Exception) -> MapError:
+def _unreadable(path: str | Path, error: Exception, *, is_file: bool) -> MapError:
     # Asked only now: GDAL also reads names that are no paths, as in /vsizip/ or netcdf:.
-    if not _may_be_no_path(str(path)) and not _exists(path):
+    if is_file and not _may_be_no_path(str(path)) and not _exists(path):
         return MapError(f"{path} does not exist; check the path")
     # Rasterio puts the reason into the cause: its own message only points there.
     reason = " ".join(str(error.__cause__ or error).split()).rstrip(".") or type(error).__name__
@@ -99,7 +124,7 @@ class FileBand(Band):
 
         size = rows.stop - rows.start, columns.stop - columns.start
         window = Window(columns.start, rows.start, size[1], size[0])
-        with _reading(self.path):
+        with reading(self.path):
             stored = self.dataset.read(self.number, window=window)
             masked = self.dataset.read_masks(self.number, window=window) == 0
             values: Array = stored.astype(np.float64)
@@ -120,7 +145,7 @@ def open_band(
 
     number : the band, 1-based, or the name of a variable. crs : where the file has none.
     """
-    with _reading(path):
+    with reading(path):
         dataset = files.enter_context(_open(path))
         if dataset.count == 0 or isinstance(number, str):
             name, number = (number, 1) if isinstance(number, str) else (None, number)
@@ -136,6 +161,30 @@ def open_band(
             dataset=dataset,
             number=number,
             path=path,
+        )
+
+
+def classic_netcdf(path: str | Path) -> tuple[Path, str | None] | None:
+    """(file, variable or None) where a name is of a netCDF file of the classic format.
+
+    The netCDF library that GDAL reads those with crashes on damaged ones, and takes long.
+    """
+    match = re.fullmatch(r'(?i:netcdf):"?(.+?)"?(?::([^:"]+))?', str(path))
+    name, variable = (match[1], match[2]) if match else (str(path), None)
+    try:
+        with Path(name).open("rb") as file:
+            return (Path(name), variable) if file.read(3) == b"CDF" else None
+    except (OSError, ValueError):
+        return None
+
+
+def open_classic_netcdf(path: Path, files: Any) -> Any:
+    """The file as an xarray Dataset, read by SciPy; closed with the stack ``files``."""
+    import xarray
+
+    with reading(path):
+        return files.enter_context(
+            xarray.open_dataset(path, engine="scipy", decode_times=False, cache=False)
         )
 
 
@@ -211,11 +260,7 @@ def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
     found = parse_crs(dataset.crs, f"the CRS of {path}")
     transform = dataset.transform
     if transform.is_identity:
-        if dataset.gcps[0] or dataset.rpcs:
-            raise MapError(
-                f"{path} is placed by ground control points or camera coefficients only; bring it "
-                "onto a grid first (gdalwarp)"
-            )
+        _require_place_may_lack(path, dataset)
         transform = Affine(1.0, 0.0, 0.0, 0.0, -1.0, float(dataset.height))
     determinant = transform.a * transform.e - transform.b * transform.d
     if not (np.isfinite(list(transform)).all() and determinant != 0.0):
@@ -223,6 +268,21 @@ def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
             f"{path} has the geotransform {tuple(transform)[:6]}, which is none; check the file"
         )
     return Grid(dataset.height, dataset.width, transform, with_crs(found, crs, path))
+
+
+def _require_place_may_lack(path: str | Path, dataset: Any) -> None:
+    """Raise MapError where a place is described, but not one that GDAL makes a grid of."""
+    if dataset.gcps[0] or dataset.rpcs:
+        raise MapError(
+            f"{path} is placed by ground control points or camera coefficients only; bring it "
+            "onto a grid first (gdalwarp)"
+        )
+    if dataset.driver in {"netCDF", "HDF5", "HDF5Image"}:
+        raise MapError(
+            f"GDAL does not find in {path} where its cells lie: the coordinates lack a "
+            "standard_name or units, or do not go in equal steps; open it with "
+            "xarray.open_dataset and give that"
+        )
 
 
 def with_crs(found: CRS | None, given: CRS | None, label: object) -> CRS | None:

@@ -23,6 +23,9 @@ MOST_BYTES = 1_000_000
 MOST_ATTEMPTS = 200
 MOST_SHOWN = 60
 
+# What pydantic calls a key that no section has.
+UNKNOWN = "unexpected_keyword_argument"
+
 
 class ScenarioError(InputError):
     """A scenario file that cannot be used."""
@@ -96,7 +99,9 @@ def _validated(data: dict[str, Any], text: str, file: Path) -> Scenario:
     try:
         scenario: Scenario = _adapter().validate_python(data)
     except ValidationError as error:
-        keys, reason = _explained(error.errors(include_url=False)[0], data)
+        # A misspelt key is why another is missing.
+        found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != UNKNOWN)
+        keys, reason = _explained(found[0], data)
         raise _error(file, text, keys, reason) from None
     return scenario
 
@@ -159,9 +164,9 @@ def _exists(path: Path) -> bool:
 def _explained(error: Mapping[str, Any], data: dict[str, Any]) -> tuple[tuple[str, ...], str]:
     """Where in the file an error of pydantic's is, and what it is."""
     keys = _keys_of(error["loc"], data)
-    if error["type"] == "unexpected_keyword_argument":
+    if error["type"] == UNKNOWN:
         return keys, _unknown(keys)
-    if error["type"] == "missing":
+    if error["type"] == "missing" and isinstance(error["loc"][-1], str):
         return keys, f"{_named(keys)} has no {error['loc'][-1]!r}; give it one"
     value = functools.reduce(lambda table, key: table[key], keys, data)
     shown = " ".join(repr(value).split())

@@ -219,7 +219,7 @@ def _layer(key: str, name: str, file: str, band: int) -> list[str]:
 
 def _band_lines(bands: list[Band], height: int, file: str) -> list[str]:
     """The other bands of the map, as layers that can be switched on."""
-    lines = [f"# Bands of {file}: {'; '.join(map(str, bands))}."]
+    lines = _comment(f"Bands of {file}: {'; '.join(map(str, bands))}.")
     for band in bands:
         if band.number != height:
             name = re.sub(r"[^A-Za-z0-9_-]+", "_", band.description).strip("_")

@@ -31,6 +31,7 @@ PLACES = (0.3, 0.6)
 # Around the map what is brought along reaches as far as this share of the map's longer side.
 MARGIN = 1.0
 
+FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30
 
 # Formats whose coordinates are said to be WGS 84 whatever they are.
@@ -280,7 +281,7 @@ def _read_layer(path: Path, name: str, *, alone: bool) -> _Layer | None:
             f"first is feature {ids[missing][0]}",
         )
     layer = _Layer(label, driver, crs, shapes[~missing], ids[~missing])
-    _require_finite(layer, "a coordinate that is not finite; mend or remove it")
+    _require_places(layer, "a coordinate that is not finite, or on no map; mend or remove it")
     return layer
 
 
@@ -293,9 +294,9 @@ def _parsed(crs: Any, label: str) -> CRS | None:
         raise MapError(f"{label}: the CRS is not understood: {_reason(error)}") from None
 
 
-def _require_finite(layer: _Layer, what: str) -> None:
+def _require_places(layer: _Layer, what: str) -> None:
     corners, owners = shapely.get_coordinates(layer.shapes, return_index=True)
-    bad = ~np.isfinite(corners).all(axis=1)
+    bad = ~(np.abs(corners) < FARTHEST).all(axis=1)
     if bad.any():
         raise MapError(f"{layer.label}: feature {layer.numbers[owners[bad][0]]} has {what}")
 
@@ -345,16 +346,16 @@ def _placed(layer: _Layer, plane: _Plane) -> list[BaseGeometry]:
             f"{layer.label} is in {crs.name}, which cannot be brought onto {target.name}: "
             f"{_reason(error)}"
         ) from None
-    if region is not None:
-        layer = _clipped(layer, region)
 
     def move(corners: Array) -> Array:
         return np.column_stack(transformer.transform(corners[:, 0], corners[:, 1]))
 
     metres = target.axis_info[0].unit_conversion_factor if target.axis_info else 1.0
-    layer = _with_more_corners(layer, move, TOLERANCE / metres)
-    layer = replace(layer, shapes=np.asarray(shapely.transform(layer.shapes, move)))
-    _require_finite(
+    with _quietly(Path(layer.label)):
+        near = layer if region is None else _clipped(layer, region)
+        near = _with_more_corners(near, move, TOLERANCE / metres)
+        layer = replace(near, shapes=np.asarray(shapely.transform(near.shapes, move)))
+    _require_places(
         layer,
         f"a place that {target.name} does not reach; check the file's CRS, or cut out the part "
         "around the map",

@@ -29,6 +29,8 @@ PATH_COLOUR = "#e4002b"
 ALTERNATIVE_COLOURS = ("#0b3dff", "#8a2be2", "#d95f02", "#00868b", "#6b4226")
 MARKS = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
 OBSTACLE_STYLE: dict[str, Any] = {"facecolor": "#3b3b3b", "edgecolor": "black", "linewidth": 0.8}
+# Overlapping margins are drawn as one where they have no more corners.
+MOST_JOINED = 100_000
 OBSTACLE_COLOUR = (0.23, 0.23, 0.23, 0.9)
 MARGIN_COLOUR = (0.23, 0.23, 0.23, 0.35)
 STEEP_COLOUR = (0.42, 0.12, 0.52, 0.55)
@@ -76,9 +78,11 @@ def _draw_margins(axes: Any, problem: Problem, terrain: Terrain) -> None:
         return
     space = problem.free_space
     discs = [shapely.Point(c.x1, c.x2).buffer(c.radius) for c in space.circles]
-    joined = shapely.get_parts(shapely.union_all([*space.geometries, *discs]))
+    shapes = np.array([*space.geometries, *discs], np.object_)
+    if shapely.get_num_coordinates(shapes).sum() < MOST_JOINED:
+        shapes = shapely.get_parts(shapely.union_all(shapes))
     patches = PatchCollection(
-        [_outline(g) for g in joined if isinstance(g, Polygon)],
+        [_outline(g) for g in shapes if isinstance(g, Polygon)],
         facecolor=MARGIN_COLOUR,
         edgecolor="black",
         linewidth=0.4,
@@ -87,7 +91,7 @@ def _draw_margins(axes: Any, problem: Problem, terrain: Terrain) -> None:
     axes.add_collection(patches)
     if terrain.in_mask_margin.any():
         _tint(axes, problem, terrain.in_mask_margin, MARGIN_COLOUR)
-    if len(joined) or space.masks:
+    if len(shapes) or space.masks:
         label = f"radius {problem.radius:g} {problem.surface.unit}".rstrip()
         _explain(axes, label, MARGIN_COLOUR)
 

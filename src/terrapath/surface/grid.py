@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from affine import Affine
@@ -11,9 +12,11 @@ from pyproj import CRS
 
 from ..errors import MapError
 from ..validation import Array
-from .georeference import local_projection, transformer
+from .georeference import local_projection, transformer, worst_scale
 
 SAME_PLACE = 1e-6  # cells
+MOST_DISTORTED = 0.001  # lengths in a map's own projection
+MOST_DISTORTED_UTM = 0.003  # and in transverse Mercator: 500 km from the central meridian
 WORST_SCALE = 0.01  # of a local projection at the map's edge
 
 
@@ -39,8 +42,31 @@ class Grid:
 
     @property
     def needs_warp(self) -> bool:
-        """Is it in degrees or turned, so that it cannot be planned on as it is?"""
-        return not self.is_upright or (self.crs is not None and self.crs.is_geographic)
+        """Is it in degrees, turned or not true to scale, so that it is not planned on as it is?"""
+        return not self.is_upright or self._needs_projection
+
+    @cached_property
+    def _needs_projection(self) -> bool:
+        """Is it in degrees, or in a projection that lengths are badly off in, as Web Mercator?"""
+        if self.crs is None:
+            return False
+        if self.crs.is_geographic:
+            return True
+        operation = self.crs.coordinate_operation
+        is_utm = operation is not None and operation.method_name == "Transverse Mercator"
+        return self._distortion() > (MOST_DISTORTED_UTM if is_utm else MOST_DISTORTED)
+
+    def _distortion(self) -> float:
+        """How far lengths in its projection are off at worst."""
+        assert self.crs is not None
+        worst = worst_scale(self.crs, *self.outline(None, points=5))
+        if not math.isfinite(worst):
+            corners = ", ".join(f"{value:.6g}" for value in self.extent())
+            raise MapError(
+                f"the map covers ({corners}) as (x_min, y_min, x_max, y_max), where its CRS, "
+                f"{self.crs.name}, does not reach; check the CRS"
+            )
+        return worst
 
     @property
     def cell(self) -> float:
@@ -131,40 +157,42 @@ class Grid:
         return x, y
 
     def _plane(self) -> CRS | None:
-        """The CRS to plan in: a local projection for degrees, its own otherwise."""
-        if self.crs is None or not self.crs.is_geographic:
+        """The CRS to plan in: its own where that is true to scale, else a local projection."""
+        if self.crs is None or not self._needs_projection:
             return self.crs
         west, south, east, north = self.extent()
-        if max(abs(south), abs(north)) > 90.0 + self.cell:
+        x, y = 0.5 * (west + east), 0.5 * (south + north)
+        if not self.crs.is_geographic:
+            x, y = transformer(self.crs, self.crs.geodetic_crs).transform(x, y)
+        elif max(abs(south), abs(north)) > 90.0 + self.cell:
             raise MapError(
                 f"the map's latitudes are {south:.6g} to {north:.6g}; they must lie between -90 "
                 "and 90; check its CRS and the order of its axes"
             )
-        plane = local_projection(self.crs, 0.5 * (west + east), 0.5 * (south + north))
-        self._require_local(plane)
+        body = self.crs.geodetic_crs
+        assert body is not None
+        plane = local_projection(body, x, y)
+        if (self.crs.is_geographic and east - west > 90.0) or self._off(plane) > WORST_SCALE:
+            across = f"{east - west:.4g} x {north - south:.4g}"
+            raise MapError(
+                f"the map reaches over {across} {self.crs.axis_info[0].unit_name}s, too far for "
+                "one local projection in metres; read a part of it with within=(x_min, y_min, "
+                "x_max, y_max), or bring it onto a projection of your choice first"
+            )
         return plane
 
-    def _require_local(self, plane: CRS) -> None:
-        """Raise MapError where a local projection is no longer true to scale."""
+    def _off(self, plane: CRS) -> float:
+        """How far lengths are off at worst in a transverse Mercator projection centred here."""
         assert self.crs is not None
         x, _ = self.outline(plane)
-        ellipsoid = self.crs.ellipsoid
-        radius = ellipsoid.semi_major_metre if ellipsoid else 6.37e6
-        # The scale of a transverse Mercator projection is 1 + (x/R)^2/2 at easting x.
-        off = 0.5 * float(np.square(x).max(initial=0.0)) / radius**2 if len(x) else math.inf
-        west, south, east, north = self.extent()
-        if off > WORST_SCALE or east - west > 90.0:
-            raise MapError(
-                f"the map reaches over {east - west:.4g} x {north - south:.4g} degrees, too far "
-                "for one local projection in metres; read a part of it with within=(x_min, "
-                "y_min, x_max, y_max), or bring it onto a projection of your choice first"
-            )
+        radius = self.crs.ellipsoid.semi_major_metre if self.crs.ellipsoid else 6.37e6
+        # The scale is 1 + (x/R)^2/2 at easting x.
+        return 0.5 * float(np.square(x).max()) / radius**2 if len(x) else math.inf
 
     def planning_grid(self) -> Grid:
         """Upright cells in a plane, rows from south to north: this grid's own where they are."""
         if not self.needs_warp:
             return self.southward()
-        from rasterio.errors import RasterioError
         from rasterio.warp import calculate_default_transform
 
         plane = self._plane()
@@ -174,7 +202,7 @@ class Grid:
             transform, columns, rows = calculate_default_transform(
                 source_crs, plane_crs, self.columns, self.rows, *self.extent()
             )
-        except RasterioError as error:
+        except Exception as error:  # rasterio lets errors of GDAL's own kind through
             reason = str(error).split("\n")[0]
             raise MapError(f"the map cannot be brought onto a plane: {reason}") from None
         return Grid(rows, columns, transform, plane, self.map_crs or self.crs).southward()

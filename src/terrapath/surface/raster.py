@@ -103,16 +103,25 @@ class Raster:
         if self._missing().all():
             raise MapError("the map holds no data at all: every cell is no-data")
 
-    def _fill(self, size: float) -> Cells:
-        """Fill small holes, continue the ground into large ones; the cells that stay blocked."""
+    def _fill(self, size: float, kinds: Sequence[str]) -> Cells:
+        """Fill small holes, continue the ground into large ones; the cells that stay blocked.
+
+        Costs are filled by their logarithms and stay within their range, above 0.
+        """
         blocked = np.zeros(self.bands.shape[1:], dtype=bool)
-        for band in self.bands:
+        for band, kind in zip(self.bands, kinds, strict=True):
             missing = missing_cells(band)
-            if size > 0.0 and missing.any():
-                low, high = np.nanmin(band), np.nanmax(band)
+            if not missing.any():
+                continue
+            if kind == "cost":
+                np.log(band, out=band)
+            low, high = np.nanmin(band), np.nanmax(band)
+            if size > 0.0:
                 fill_small_holes(band, missing, self.transform.a, self.transform.e, size)
                 np.clip(band, low, high, out=band)
             continue_into_holes(band, missing)
+            if kind == "cost":
+                np.exp(np.clip(band, low, high, out=band), out=band)
             blocked |= missing
         return blocked
 
@@ -128,12 +137,13 @@ class Raster:
     ) -> Surface:
         """The spline surface through the cell centres; cells without data are blocked.
 
-        fill_holes : the longest side of holes that are filled and free, map units.
+        kinds : "rise" or "cost" of each layer. fill_holes : the longest side of holes that are
+        filled and free, map units.
         The raster is used up: its cells without data are given values.
         """
         raster = self._southward()
         raster._require_data()
-        blocked = raster._fill(fill_holes)
+        blocked = raster._fill(fill_holes, kinds or ["rise"] * len(names))
         x, y = raster.grid.centres()
         options: dict[str, Any] = {} if kinds is None else {"kinds": kinds}
         try:
