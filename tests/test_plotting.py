@@ -1,5 +1,9 @@
 """Pictures: that they show what they should, by asking the figure and by counting pixels."""
 
+import base64
+import json
+import re
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +14,16 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.image import imread
 
 import terrapath as tp
-from terrapath.plotting import draw_field, draw_route, plot_field, plot_route
+from terrapath.plotting import (
+    draw_field,
+    draw_page,
+    draw_profile,
+    draw_route,
+    plot_field,
+    plot_page,
+    plot_profile,
+    plot_route,
+)
 from terrapath.plotting.map_view import PATH_COLOUR
 from terrapath.plotting.perspective import _is_hidden, _view_direction
 from terrapath.plotting.terrain import Terrain
@@ -154,3 +167,164 @@ def test_a_failed_drawing_leaves_no_file(solution, tmp_path):
     with pytest.raises(tp.MapError, match=r"picture.bmp"):
         plot_route(solution, tmp_path / "picture.bmp")
     assert list(tmp_path.iterdir()) == []
+
+
+# Profiles
+
+
+def test_the_profile_chart_shows_height_slope_and_each_further_layer(solution, tmp_path):
+    figure = draw_profile(solution)
+    height, slope, resistance = figure.axes
+    profile = solution.path.profile
+    for axes, values in ((height, profile.values[:, 0]), (resistance, profile.values[:, 1])):
+        np.testing.assert_array_equal(axes.lines[0].get_xdata(), profile.distance)
+        np.testing.assert_array_equal(axes.lines[0].get_ydata(), values)
+    # Heights by differences, independently of the gradients that slopes are made of.
+    along = slope.lines[0].get_ydata()
+    steps = np.hypot(*np.diff(profile.points, axis=0).T)
+    measured = np.degrees(np.arctan(np.diff(profile.values[:, 0]) / steps))
+    assert np.median(np.abs(0.5 * (along[1:] + along[:-1]) - measured)) < 0.2
+    assert slope.get_ylabel() == "slope (degrees)"
+    assert height.get_ylabel() == "height"
+    assert resistance.get_xlabel() == "distance along the surface"
+    assert f"{solution.length:.4f}" in figure.get_suptitle()
+    for ending in (".png", ".svg", ".pdf"):
+        plot_profile(solution, tmp_path / f"profile{ending}")
+    picture = imread(tmp_path / "profile.png")
+    assert pixels_of(picture, PATH_COLOUR) > 500
+
+
+def test_the_limit_of_the_slope_is_drawn_where_there_is_one(solution):
+    problem = copy(solution.problem)
+    problem.max_slope = 25.0
+    slope = draw_profile(replace(solution, problem=problem)).axes[1]
+    limits = [line for line in slope.lines if line.get_linestyle() == "--"]
+    assert [line.get_ydata()[0] for line in limits] == [25.0, -25.0]
+
+
+def test_long_profiles_in_metres_are_labelled_in_kilometres():
+    figure = draw_profile(tp.RRT(samples=2000).solve(tp.scenes.load("jacksboro")))
+    assert figure.axes[-1].get_xlabel() == "distance along the surface (km)"
+    assert figure.axes[0].get_ylabel() == "height (m)"
+
+
+def test_there_is_no_profile_without_a_path(problem, tmp_path):
+    nothing = tp.RRTStar(samples=5, step=0.1).solve(problem)
+    with pytest.raises(tp.MapError, match="no path"):
+        plot_profile(nothing, tmp_path / "profile.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+# Pages
+
+
+def traces_of(page):
+    """The traces in a page's JSON, by their names."""
+    text = page.read_text(encoding="utf-8")
+    start = text.index("[", text.rindex("Plotly.newPlot("))
+    traces, _ = json.JSONDecoder().raw_decode(text[start:])
+    return {trace["name"]: trace for trace in traces}
+
+
+def decoded(array):
+    """Plotly's JSON of an array, as NumPy."""
+    if not isinstance(array, dict):
+        return np.array(array, float)
+    values = np.frombuffer(base64.b64decode(array["bdata"]), array["dtype"])
+    return values.reshape([int(n) for n in array["shape"].split(",")] if "shape" in array else -1)
+
+
+def test_a_page_holds_the_route_on_the_terrain(solution, tmp_path):
+    plot_page(solution, tmp_path / "page.html")
+    traces = traces_of(tmp_path / "page.html")
+    assert {"terrain", "blocked", "outlines", "route", "start", "goal"} <= set(traces)
+    route, profile = traces["route"], solution.path.profile
+    x, y, z = (decoded(route[axis]) for axis in "xyz")
+    assert np.column_stack([x, y]).tolist() == profile.points.tolist()
+    told = decoded(route["customdata"])
+    assert told[:, 0].tolist() == profile.distance.tolist()
+    assert told[:, 1].tolist() == profile.values[:, 0].tolist()
+    assert ((z > profile.values[:, 0]) & (z < profile.values[:, 0] + 0.25)).all()
+    ground = traces["terrain"]
+    heights = decoded(ground["z"])
+    assert max(heights.shape) <= 300
+    at = np.stack(np.meshgrid(decoded(ground["x"]), decoded(ground["y"])), axis=-1)
+    expected = solution.problem.surface.values(at)
+    np.testing.assert_allclose(heights, expected[..., 0], atol=1e-5)
+    np.testing.assert_allclose(decoded(ground["surfacecolor"]), expected[..., 1], atol=1e-5)
+    blocked = decoded(traces["blocked"]["z"])
+    for j, i in [(0, 0), (130, 130), (150, 110), (200, 250)]:
+        free = solution.problem.free_space.blocker(tuple(at[j, i])) is None
+        assert np.isnan(blocked[j, i]) == free
+
+
+def test_a_page_needs_no_network_and_is_the_same_each_time(solution, tmp_path):
+    plot_page(solution, tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert not re.search(r"<(script|link|img|iframe)[^>]*\b(src|href)\s*=", text)
+    assert 4e6 < len(text) < 12e6  # plotly.js is inside
+    plot_page(solution, tmp_path / "again.html")
+    assert (tmp_path / "again.html").read_text(encoding="utf-8") == text
+
+
+def test_a_page_exaggerates_heights_by_its_buttons(solution):
+    figure = draw_page(solution)
+    buttons = figure.layout.updatemenus[0].buttons
+    assert [button.label for button in buttons] == ["1x", "2x", "5x"]
+    ratios = [button.args[0]["scene.aspectratio"] for button in buttons]
+    low, high = figure.layout.scene.zaxis.range
+    west, east = figure.layout.scene.xaxis.range
+    # At 1x a unit of height is drawn as long as a unit of the plane.
+    assert ratios[0]["z"] / ratios[0]["x"] == pytest.approx((high - low) / (east - west))
+    assert [ratio["z"] / ratios[0]["z"] for ratio in ratios] == pytest.approx([1, 2, 5])
+
+
+def test_far_from_zero_a_page_counts_from_a_nearer_corner():
+    axis = np.linspace(0, 100, 9)
+    x, y = 4_100_000.25 + axis, 512_000.5 + axis
+    surface = tp.Surface.from_grid(np.outer(axis, axis) / 1000, x, y)
+    problem = tp.Problem(surface, (x[1], y[1]), (x[7], y[6]))
+    path = problem.path([problem.start, problem.goal])
+    solution = tp.Solution(
+        problem=problem, planner="rrt", status=tp.Status.SOLVED, path=path, cost=1.0, seconds=0.0
+    )
+    figure = draw_page(solution)
+    route = next(trace for trace in figure.data if trace.name == "route")
+    np.testing.assert_array_equal(route.x + 4_100_000, path.profile.points[:, 0])
+    np.testing.assert_array_equal(route.customdata[:, 4:], path.profile.points)
+    assert figure.layout.scene.xaxis.title.text == "x1 - 4100000"
+
+
+def test_names_from_files_are_no_markup(solution, tmp_path):
+    problem = copy(solution.problem)
+    problem.name = "</script><script>alert(1)</script>\udc80"
+    plot_page(replace(solution, problem=problem), tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "alert(1)" in text
+    assert "<script>alert" not in text
+
+
+def test_next_best_routes_and_a_search_without_a_path_have_their_pages(solution, tmp_path):
+    bow = solution.problem.path([(0, 0), (2, 8), (10, 10)])
+    plot_page(replace(solution, alternatives=(bow,)), tmp_path / "page.html")
+    drawn = traces_of(tmp_path / "page.html")[f"next best, {bow.length:.4f}"]
+    assert decoded(drawn["x"]).tolist() == bow.profile.points[:, 0].tolist()
+    nothing = tp.RRTStar(samples=5, step=0.1).solve(solution.problem)
+    assert "found no path" in draw_page(nothing).layout.title.text
+    with pytest.raises(tp.MapError, match=r"page\.png.*\.html"):
+        plot_page(solution, tmp_path / "page.png")
+
+
+def test_names_of_any_letters_are_drawn(tmp_path):
+    axis = np.linspace(0, 10, 9)
+    values = np.random.default_rng(0).uniform(0, 1, (3, 9, 9))
+    names = ["height", "a $ and $^ of\n\u2028\udc80 <b>", "%{x} $\\frac$"]
+    surface = tp.Surface.from_grid(values, axis, axis, names=names, units=["$", "\x00", "m^2$$"])
+    problem = tp.Problem(surface, (1, 1), (9, 8), name="$\\undefined$ \udc80")
+    path = problem.path([problem.start, problem.goal])
+    solution = tp.Solution(
+        problem=problem, planner="rrt", status=tp.Status.SOLVED, path=path, cost=1.0, seconds=0.0
+    )
+    for plot, name in ((plot_profile, "p.svg"), (plot_route, "r.png"), (plot_page, "p.html")):
+        plot(solution, tmp_path / name)
+    assert "a $ and $^ of" in draw_profile(solution).axes[2].get_ylabel().replace("\\$", "$")

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 import terrapath as tp
 from terrapath.experiments import nonsmooth
-from terrapath.surface.smoothing import smooth
+from terrapath.surface.smoothing import quantisation_step, scale_for_step, smooth
 
 BOUNDS = (-5.0, -5.0, 5.0, 5.0)
 scales = st.floats(0.05, 4.0)
@@ -415,3 +415,87 @@ def test_rrt_star_finds_no_shorter_path_and_none_much_longer(name):
 
 def test_observed_order_is_the_exponent_of_a_power():
     assert nonsmooth.observed_order((1.0, 0.5, 0.1), (3.0, 3.0 / 8, 3e-3)) == pytest.approx(3.0)
+
+
+# Heights that are rounded
+
+
+def rounded_terrain(step, cell, *, count=400, seed=0):
+    """(true heights, rounded ones): hills of some 60 cells."""
+    random = np.random.default_rng(seed)
+    x = np.arange(count) * cell
+    waves = random.uniform(-1.0, 1.0, (12, 2)) * 2.0 * np.pi / (60.0 * cell)
+    phases = random.uniform(0.0, 2.0 * np.pi, 12)
+    y = x[:, None]
+    hills = [np.sin(a * x + b * y + p) for (a, b), p in zip(waves, phases, strict=True)]
+    heights = 4.0 * step * np.sum(hills, axis=0)
+    return heights, np.round(heights / step) * step
+
+
+@pytest.mark.parametrize("scale", [1.5, 2.5, 4.0])
+def test_the_slope_error_of_white_rounding_is_the_formulas(scale):
+    # Uniform noise of the width of a step, as rounding leaves it where the ground is not level.
+    step, cell, count = 0.7, 2.0, 500
+    noise = np.random.default_rng(1).uniform(-0.5 * step, 0.5 * step, (count, count))
+    x = cell * np.arange(count)
+    surface = tp.Surface.from_grid(noise, x, x, smoothing=scale * cell)
+    points = points_in((60.0, 60.0, 940.0, 940.0), 40_000)
+    found = np.sqrt(np.square(surface.gradients(points)[:, 0]).mean())
+    expected = step / math.sqrt(12.0) * cell / ((scale * cell) ** 2 * math.sqrt(8.0 * math.pi))
+    assert found == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize(("step", "cell"), [(1.0, 1.0), (0.1, 0.5), (1.0, 10.0)])
+def test_the_default_scale_brings_the_slope_error_of_rounding_to_a_percent(step, cell):
+    true, rounded = rounded_terrain(step, cell)
+    scale = scale_for_step(step, cell)
+    assert scale == pytest.approx(math.sqrt(5.7583 * step * cell), rel=1e-4)
+    x = cell * np.arange(len(true))
+    exact = tp.Surface.from_grid(true, x, x)
+    raw, smoothed = (tp.Surface.from_grid(rounded, x, x, smoothing=s) for s in (None, scale))
+    inside = (20.0 * cell, 20.0 * cell, 379.0 * cell, 379.0 * cell)
+    points = points_in(inside, 20_000)
+    wanted = exact.gradients(points)[:, 0]
+    off = {
+        name: np.sqrt(np.square(surface.gradients(points)[:, 0] - wanted).mean())
+        for name, surface in (("raw", raw), ("smoothed", smoothed))
+    }
+    # Rounding is not quite white, and hills are smoothed too.
+    assert off["smoothed"] < 0.03
+    assert off["raw"] > 3.0 * off["smoothed"]
+
+
+def test_the_scale_is_none_on_coarse_cells_and_a_few_cells_on_fine_ones():
+    assert scale_for_step(1.0, 1.0) == pytest.approx(2.4, abs=0.01)
+    assert scale_for_step(1.0, 80.0) == 0.0  # a slope of 1 % is 0.8 m a cell
+    assert scale_for_step(1.0, 30.0) == 0.0
+
+
+@given(
+    step=st.sampled_from([1.0, 0.1, 0.25, 0.3048, 2.0, 0.01]),
+    offset=st.floats(-1000.0, 3000.0),
+    single=st.booleans(),
+    seed=seeds,
+)
+@settings(deadline=None, max_examples=60)
+def test_the_step_of_rounded_heights_is_found(step, offset, single, seed):
+    random = np.random.default_rng(seed)
+    heights = offset + step * random.integers(0, 400, (60, 50))
+    heights = heights.astype(np.float32).astype(float) if single else heights
+    heights[random.random(heights.shape) < 0.1] = np.nan
+    assert quantisation_step(heights) == pytest.approx(step, rel=1e-3)
+
+
+@given(seeds, st.floats(0.1, 1000.0), st.booleans())
+@settings(deadline=None, max_examples=60)
+def test_heights_that_are_not_rounded_have_no_step(seed, spread, single):
+    heights = np.random.default_rng(seed).normal(scale=spread, size=(60, 50)) + 500.0
+    heights = heights.astype(np.float32).astype(float) if single else heights
+    assert quantisation_step(heights) == 0.0
+
+
+def test_too_few_levels_tell_no_step():
+    block = np.zeros((40, 40))
+    block[10:20, 10:20] = 10.0
+    assert quantisation_step(block) == 0.0
+    assert quantisation_step(np.full((5, 5), np.nan)) == 0.0

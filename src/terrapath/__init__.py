@@ -26,7 +26,16 @@ if TYPE_CHECKING:
         TerrapathError,
     )
     from .free_space import Circle, FreeSpace
-    from .io import LayerSource, read_surface, write_field, write_route
+    from .io import (
+        LayerSource,
+        RepairedWarning,
+        VectorWarning,
+        read_area,
+        read_obstacles,
+        read_surface,
+        write_field,
+        write_route,
+    )
     from .lattice import Lattice
     from .metric import chord, curve_length, line_r
     from .planners import (
@@ -40,7 +49,7 @@ if TYPE_CHECKING:
         RRTStar,
         plan,
     )
-    from .plotting import plot_field, plot_route
+    from .plotting import plot_field, plot_page, plot_profile, plot_route
     from .problem import Path, Problem, Solution, Status
     from .refinement import refine
     from .surface import Layer, Mask, Surface
@@ -61,6 +70,10 @@ _HOMES = {
     "Circle": "free_space",
     "FreeSpace": "free_space",
     "LayerSource": "io",
+    "RepairedWarning": "io",
+    "VectorWarning": "io",
+    "read_area": "io",
+    "read_obstacles": "io",
     "read_surface": "io",
     "write_field": "io",
     "write_route": "io",
@@ -78,6 +91,8 @@ _HOMES = {
     "Progress": "planners",
     "plan": "planners",
     "plot_field": "plotting",
+    "plot_page": "plotting",
+    "plot_profile": "plotting",
     "plot_route": "plotting",
     "Path": "problem",
     "Problem": "problem",
@@ -113,10 +128,12 @@ __all__ = [
     "Problem",
     "Progress",
     "RRTStar",
+    "RepairedWarning",
     "Solution",
     "Status",
     "Surface",
     "TerrapathError",
+    "VectorWarning",
     "__version__",
     "alternatives",
     "chord",
@@ -128,7 +145,11 @@ __all__ = [
     "metric",
     "plan",
     "plot_field",
+    "plot_page",
+    "plot_profile",
     "plot_route",
+    "read_area",
+    "read_obstacles",
     "read_surface",
     "refine",
     "scenes",

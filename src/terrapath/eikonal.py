@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -271,6 +271,7 @@ class DistanceField:
     """Distances under h from one source, at the nodes of a lattice.
 
     values : (ny, nx), map units, infinite where no path was found on the lattice.
+    problem : what was asked for, where a problem from the source to itself was made of it.
     """
 
     surface: Surface
@@ -278,6 +279,7 @@ class DistanceField:
     source: tuple[float, float]
     medium: Medium
     values: Array
+    problem: Problem | None = None
 
     @property
     def lattice(self) -> Lattice:
@@ -391,19 +393,41 @@ def distance_field(
     *,
     bounds: Any = None,
     obstacles: Iterable[Obstacle] = (),
+    radius: float = 0.0,
+    max_slope: float | None = None,
+    keep_in: Any = None,
     spacing: float | None = None,
     watch: Watch | None = None,
 ) -> DistanceField:
     """Distances on the surface from a start to everywhere, by fast marching.
 
-    start : (x1, x2), map units, in free space. bounds, obstacles : as of ``Problem``.
+    start : (x1, x2), map units, in free space.
+    bounds, obstacles, radius, max_slope, keep_in : as of ``Problem``.
     spacing : of the nodes, map units; by default a 250th of the region's
     longer side, or a cell of a finer map.
     watch : now and then called with the number of settled nodes; returning True stops.
     Raises OutsideSurfaceError or InputError, naming the value and the remedy.
     """
-    problem = Problem(surface, start, start, bounds, obstacles)
+    problem = Problem(
+        surface,
+        start,
+        start,
+        bounds,
+        obstacles,
+        radius=radius,
+        max_slope=max_slope,
+        keep_in=keep_in,
+    )
+    return field_of(problem, spacing=spacing, watch=watch)
+
+
+def field_of(
+    problem: Problem, *, spacing: float | None = None, watch: Watch | None = None
+) -> DistanceField:
+    """Distances from a problem's start through its free space; see ``distance_field``."""
+    surface = problem.surface
     chosen = default_spacing(problem.bounds, surface.resolution) if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(surface, lattice, problem.free_space)
-    return march_from(surface, problem.free_space, problem.start, medium, watch=watch)
+    field = march_from(surface, problem.free_space, problem.start, medium, watch=watch)
+    return replace(field, problem=problem)

@@ -23,3 +23,7 @@ class MapError(TerrapathError):
 
 class CertificateError(TerrapathError):
     """A certificate that does not prove what it claims."""
+
+
+class TerrapathWarning(UserWarning):
+    """Base of every warning that Terrapath gives on purpose. The command shows it as one line."""

@@ -10,11 +10,26 @@ from pathlib import Path
 
 from .errors import MapError
 
+# The one output that is a folder: a ROS 2 bag, and the file that tells that a folder is one.
+BAG_ENDING, BAG_MARK = ".bag2", "metadata.yaml"
+
+
+def _require_bag(path: Path) -> None:
+    """Raise OSError where something else than a bag, or than an empty folder, would be lost."""
+    if not path.exists() and not path.is_symlink():
+        return
+    if path.is_symlink() or not path.is_dir():
+        raise NotADirectoryError(f"{path} is there already and is no folder")
+    if any(path.iterdir()) and not (path / BAG_MARK).is_file():
+        raise FileExistsError(f"{path} is a folder that holds other things than a ROS 2 bag")
+
 
 def require_writable(path: Path) -> None:
     """Raise MapError where a file cannot be written, without leaving anything there."""
     try:
-        if path.is_dir():
+        if path.suffix.lower() == BAG_ENDING:
+            _require_bag(path)
+        elif path.is_dir():
             raise IsADirectoryError(f"{path} is a directory")
         if path.exists() and not os.access(path, os.W_OK):
             raise PermissionError(f"{path} is write-protected")
@@ -44,6 +59,31 @@ def written_whole(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def folder_written_whole(path: Path) -> Iterator[Path]:
+    """A path for a new folder of the same name; it takes its place only when all went well.
+
+    It replaces an older bag, and nothing else: see ``require_writable``.
+    """
+    try:
+        _require_bag(path)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".terrapath-") as aside:
+            made, old = Path(aside) / path.name, Path(aside) / "replaced"
+            yield made
+            made.chmod(0o777 & ~_umask())
+            if path.exists():
+                path.rename(old)
+            try:
+                made.rename(path)
+            except OSError:
+                if old.exists():
+                    old.rename(path)
+                raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise MapError(f"{path} could not be written: {reason}") from None
 
 
 def _umask() -> int:

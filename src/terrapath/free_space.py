@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -52,40 +52,81 @@ class Circle:
 Obstacle: TypeAlias = BaseGeometry | Circle | Mask
 _Patch: TypeAlias = tuple[Any, npt.NDArray[np.bool_]]
 Indices: TypeAlias = npt.NDArray[np.int64]
+Geometries: TypeAlias = npt.NDArray[np.object_]
 
 
-def _parts(obstacle: BaseGeometry, index: int) -> Iterator[BaseGeometry]:
-    """Polygons and lines of a geometry, checked."""
-    if obstacle.is_empty:
-        return
-    if not shapely.is_valid(obstacle):
-        raise InputError(
-            f"obstacles[{index}] is not valid: {shapely.is_valid_reason(obstacle)}; "
-            "repair it with shapely.make_valid"
-        )
-    for part in shapely.get_parts(obstacle):
-        if isinstance(part, shapely.GeometryCollection) or hasattr(part, "geoms"):
-            yield from _parts(part, index)
-        elif isinstance(part, shapely.Polygon | shapely.LineString):
-            yield part
+POINTS = (0, 4)  # shapely's type ids
+POLYGON = 3
+
+
+class Parts(NamedTuple):
+    """Obstacles sorted by what they are; geometries are split into points, lines and polygons."""
+
+    geometries: Geometries  # (m,)
+    owners: Indices  # (m,): the obstacle that each belongs to
+    circles: list[Circle]
+    masks: list[Mask]
+
+
+def sort_obstacles(obstacles: Iterable[Obstacle]) -> Parts:
+    """Obstacles taken apart and checked. Raises InputError with the place of one that is none."""
+    geometries, places = [], []
+    circles, masks = [], []
+    for index, obstacle in enumerate(obstacles):
+        if isinstance(obstacle, Circle):
+            circles.append(obstacle)
+        elif isinstance(obstacle, Mask):
+            masks.append(obstacle)
+        elif isinstance(obstacle, BaseGeometry):
+            geometries.append(obstacle)
+            places.append(index)
         else:
             raise InputError(
-                f"obstacles[{index}] holds a {part.geom_type}, which has no width to avoid; "
-                "give it one with buffer(radius)"
+                f"obstacles[{index}] is a {type(obstacle).__name__}; "
+                "give shapely geometries, Circle or Mask"
             )
+    whole, owners = np.array(geometries, np.object_), np.array(places, np.int64)
+    invalid = ~shapely.is_valid(whole)
+    if invalid.any():
+        raise InputError(
+            f"obstacles[{owners[invalid][0]}] is not valid: "
+            f"{shapely.is_valid_reason(whole[invalid][0])}; repair it with shapely.make_valid"
+        )
+    return Parts(*simple_parts(whole, owners), circles, masks)
 
 
-def _lines(geometry: BaseGeometry) -> list[BaseGeometry]:
-    """The rings of a polygon, or a line itself."""
-    if isinstance(geometry, shapely.Polygon):
-        return [geometry.exterior, *geometry.interiors]
-    return [geometry]
+def simple_parts(geometries: Geometries, owners: Indices) -> tuple[Geometries, Indices]:
+    """Points, lines and polygons of geometries, however deep they are nested, none empty."""
+    while (shapely.get_type_id(geometries) > POLYGON).any():
+        geometries, which = shapely.get_parts(geometries, return_index=True)
+        owners = owners[which]
+    kept = ~shapely.is_empty(geometries)
+    return geometries[kept], owners[kept]
 
 
-def _edges(geometry: BaseGeometry) -> Array:
-    """Boundary edges (m, 4) of a polygon with its holes, or of a line."""
-    coordinates = [shapely.get_coordinates(line) for line in _lines(geometry)]
-    return np.concatenate([np.hstack([line[:-1], line[1:]]) for line in coordinates])
+def _refuse_points(parts: Parts) -> None:
+    without_width = np.isin(shapely.get_type_id(parts.geometries), POINTS)
+    if without_width.any():
+        raise InputError(
+            f"obstacles[{parts.owners[without_width][0]}] holds a Point, which has no width to "
+            "avoid; give the problem a radius, or the point a width with buffer(radius)"
+        )
+
+
+def outlines(geometries: Geometries) -> tuple[Geometries, Indices]:
+    """The rings of polygons, and other parts themselves, in their order; whose each of them is."""
+    rings, owners = shapely.get_rings(geometries, return_index=True)
+    is_other = shapely.get_type_id(geometries) != POLYGON
+    owners = np.concatenate([owners, np.flatnonzero(is_other)])
+    order = np.argsort(owners, kind="stable")
+    return np.concatenate([rings, geometries[is_other]])[order], owners[order]
+
+
+def _edges(geometries: Geometries) -> Array:
+    """Boundary edges (m, 4) of polygons with their holes, and of lines."""
+    corners, line = shapely.get_coordinates(outlines(geometries)[0], return_index=True)
+    edges = np.hstack([corners[:-1], corners[1:]])
+    return np.asarray(edges[line[1:] == line[:-1]].reshape(-1, 4))
 
 
 def _lists(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
@@ -107,27 +148,17 @@ class FreeSpace:
 
     def __init__(self, bounds: Bounds, obstacles: Iterable[Obstacle] = ()) -> None:
         self.bounds = bounds
-        self.geometries: list[BaseGeometry] = []
-        self.circles: list[Circle] = []
-        self.masks: list[Mask] = []
-        for index, obstacle in enumerate(obstacles):
-            if isinstance(obstacle, Circle):
-                self.circles.append(obstacle)
-            elif isinstance(obstacle, Mask):
-                self.masks.append(obstacle)
-            elif isinstance(obstacle, BaseGeometry):
-                self.geometries.extend(_parts(obstacle, index))
-            else:
-                raise InputError(
-                    f"obstacles[{index}] is a {type(obstacle).__name__}; "
-                    "give shapely geometries, Circle or Mask"
-                )
-        for geometry in self.geometries:
-            shapely.prepare(geometry)
+        parts = sort_obstacles(obstacles)
+        _refuse_points(parts)
+        self.geometries: list[BaseGeometry] = list(parts.geometries)
+        self.circles = parts.circles
+        self.masks = parts.masks
+        self._geometries = parts.geometries
+        shapely.prepare(self._geometries)
         self.data = self._index()
 
     def _index(self) -> kernels.Space:
-        edges = np.concatenate([np.empty((0, 4)), *map(_edges, self.geometries)])
+        edges = _edges(self._geometries)
         circles = np.array([[c.x1, c.x2, c.radius] for c in self.circles]).reshape(-1, 3)
         grid = self._grid(len(edges) + len(circles))
         edge_first, edge_ids = _lists(kernels.list_edges, grid, edges)
@@ -163,7 +194,7 @@ class FreeSpace:
         masks = range(len(self.masks))
         if any(kernels.mask_is_hit(self.data, mask, *point, *point) for mask in masks):
             return "in a blocked or no-data cell"
-        if any(shapely.intersects_xy(geometry, *point) for geometry in self.geometries):
+        if shapely.intersects_xy(self._geometries, *point).any():
             return "inside an obstacle"
         discs = ((circle.x1, circle.x2, circle.radius) for circle in self.circles)
         if any(kernels.may_enter_circle(*point, *point, *disc) for disc in discs):
@@ -190,7 +221,8 @@ class FreeSpace:
         covered = np.zeros((lattice.ny - 1, lattice.nx - 1), bool)
         for mask in self.masks:
             covered |= _covered_by_mask(mask, lattice)
-        patches = [_covered_by_geometry(geometry, lattice) for geometry in self.geometries]
+        large = self._geometries[_may_cover(self._geometries, lattice)]
+        patches = [_covered_by_geometry(geometry, lattice) for geometry in large]
         patches += [_covered_by_disc(circle, lattice) for circle in self.circles]
         for window, inside in patches:
             covered[window] |= inside
@@ -206,18 +238,24 @@ class FreeSpace:
         for name, point in (("a", as_point(a, "a")), ("b", as_point(b, "b"))):
             if blocker := self.blocker(point):
                 raise InputError(f"{name}=({point[0]:.10g}, {point[1]:.10g}) is {blocker}")
-        outlines = [*self.geometries, *(circle.inscribed for circle in self.circles)]
-        walls = np.array([line for outline in outlines for line in _lines(outline)], np.object_)
+        discs = np.array([circle.inscribed for circle in self.circles], np.object_)
+        walls, _ = outlines(np.concatenate([self._geometries, discs]))
         return separated(self.bounds, self.data, self.masks, walls, a, b)
 
 
-def _covered_by_geometry(geometry: BaseGeometry, lattice: Lattice) -> _Patch:
+def _may_cover(geometries: Geometries, lattice: Lattice) -> npt.NDArray[np.bool_]:
+    """Which are polygons that are large enough to cover a cell?"""
+    west, south, east, north = shapely.bounds(geometries).reshape(-1, 4).T
+    slack = 1.0 - 1e-9
+    is_large = (east - west >= slack * lattice.dx) & (north - south >= slack * lattice.dy)
+    return np.asarray(is_large & (shapely.get_type_id(geometries) == POLYGON))
+
+
+def _covered_by_geometry(polygon: BaseGeometry, lattice: Lattice) -> _Patch:
     """Cells around a polygon that it covers."""
-    if not isinstance(geometry, shapely.Polygon):
-        return np.s_[0:0, 0:0], np.zeros((0, 0), bool)
-    window, low, high = _cells_near(lattice, geometry.bounds)
+    window, low, high = _cells_near(lattice, polygon.bounds)
     boxes = shapely.box(low[..., 0], low[..., 1], high[..., 0], high[..., 1])
-    return window, np.asarray(shapely.covers(geometry, boxes), bool).reshape(low.shape[:2])
+    return window, np.asarray(shapely.covers(polygon, boxes), bool).reshape(low.shape[:2])
 
 
 def _covered_by_disc(circle: Circle, lattice: Lattice) -> _Patch:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -12,10 +13,12 @@ import numpy as np
 import shapely
 
 from . import metric
+from .clearance import Constraints, outside_of
 from .errors import InputError, OutsideSurfaceError
-from .free_space import FreeSpace, Obstacle
+from .free_space import Obstacle
+from .steepness import Steepness
 from .surface import Surface
-from .validation import Array, Bounds, as_bounds, as_point
+from .validation import Array, Bounds, as_bounds, as_point, require_not_negative
 
 # Points a path is cut into to add up climb and draw profiles, unless the surface is finer.
 PROFILE_POINTS = 256
@@ -28,6 +31,11 @@ class Problem:
     bounds : (x1_min, x2_min, x1_max, x2_max), map units; by default the surface's.
     obstacles : shapely polygons and lines, ``Circle`` and ``Mask``, map units.
     The surface's no-data cells are obstacles too.
+    radius : of the vehicle, map units; obstacles of all kinds are inflated by it, so that a path
+    is never nearer to one. Points are obstacles, too, where there is a radius.
+    max_slope : degrees; ground on which the first layer, without its weight, rises more is an
+    obstacle. keep_in : shapely polygon or polygons that the vehicle stays inside of.
+    ``obstacles`` are those given, ``free_space`` is what they leave to the vehicle's centre.
     Raises OutsideSurfaceError or InputError, naming the value and the remedy.
     """
 
@@ -39,14 +47,35 @@ class Problem:
         bounds: Any = None,
         obstacles: Iterable[Obstacle] = (),
         *,
+        radius: float = 0.0,
+        max_slope: float | None = None,
+        keep_in: Any = None,
         name: str = "",
     ) -> None:
         self.surface = surface
         self.name = name
         self.bounds = self._make_bounds(surface, bounds)
-        given = [obstacles] if isinstance(obstacles, Obstacle) else list(obstacles)
-        nodata = [] if surface.nodata is None else [surface.nodata]
-        self.free_space = FreeSpace(self.bounds, [*given, *nodata])
+        try:
+            given = (obstacles,) if isinstance(obstacles, Obstacle) else tuple(obstacles)
+        except TypeError:
+            raise InputError(
+                f"obstacles={obstacles!r} is no list of obstacles; "
+                "give shapely geometries, Circle or Mask"
+            ) from None
+        require_not_negative(radius=radius)
+        self.obstacles: tuple[Obstacle, ...] = given
+        self.radius = float(radius)
+        self.max_slope = max_slope
+        self.keep_in = keep_in
+        self.constraints = Constraints(
+            bounds=self.bounds,
+            obstacles=given,
+            nodata=surface.nodata,
+            steepness=None if max_slope is None else Steepness(surface, max_slope, self.bounds),
+            outside=None if keep_in is None else outside_of(keep_in, self.bounds, self.radius),
+            radius=self.radius,
+        )
+        self.free_space = self.constraints.free_space()
         self.start = self._check("start", start)
         self.goal = self._check("goal", goal)
 
@@ -69,13 +98,22 @@ class Problem:
 
     def _check(self, name: str, value: Any) -> tuple[float, float]:
         point = as_point(value, name)
-        blocker = self.free_space.blocker(point)
-        if blocker is None:
+        if not self.bounds.contains(np.array(point)):
+            shown = f"{name}=({point[0]:.10g}, {point[1]:.10g}) is outside the bounds {self.bounds}"
+            raise OutsideSurfaceError(f"{shown}; check the axis order or the CRS")
+        if self.free_space.blocker(point) is None:
             return point
+        blocker = self.constraints.blocker(point, self.surface.unit)
         shown = f"{name}=({point[0]:.10g}, {point[1]:.10g})"
-        if blocker.startswith("outside"):
-            raise OutsideSurfaceError(f"{shown} is {blocker}; check the axis order or the CRS")
         raise InputError(f"{shown} is {blocker}; move it to free ground")
+
+    def between(self, start: Any, goal: Any, names: tuple[str, str] = ("start", "goal")) -> Problem:
+        """The same ground with another start and goal, which errors call by ``names``."""
+        other = copy.copy(self)
+        for known in ("straight_length", "is_unreachable"):
+            other.__dict__.pop(known, None)
+        other.start, other.goal = self._check(names[0], start), self._check(names[1], goal)
+        return other
 
     def path(self, points: Any) -> Path:
         """A path of this problem's surface through the given points."""
@@ -92,8 +130,13 @@ class Problem:
         return self.free_space.separates(self.start, self.goal)
 
     def __repr__(self) -> str:
-        name = f"{self.name}: " if self.name else ""
-        return f"Problem({name}{self.start} to {self.goal} within {self.bounds}; {self.surface!r})"
+        # Also of a problem that is only half made, as debuggers show one whose end is refused.
+        known = vars(self)
+        name = f"{known['name']}: " if known.get("name") else ""
+        start, goal, bounds, surface = (
+            known.get(key, "?") for key in ("start", "goal", "bounds", "surface")
+        )
+        return f"Problem({name}{start} to {goal} within {bounds}; {surface!r})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,6 +290,7 @@ class Solution:
     history: History | None = None
     tree: SearchTree | None = None
     counters: dict[str, int] = field(default_factory=dict)
+    legs: tuple[Solution, ...] = ()  # of a tour, from each waypoint to the next
 
     @property
     def length(self) -> float | None:

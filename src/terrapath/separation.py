@@ -48,7 +48,7 @@ def separated(
     space : all obstacles, for segments to be tested against. masks : theirs. walls : lines,
     each of which lies wholly in one of the other obstacles.
     """
-    windows = [_Window.of(mask, bounds) for mask in _merged(masks)]
+    windows = [_Window.of(mask, bounds) for mask in merged_masks(masks)]
     if any(window.separates(a, b) for window in windows):
         return True
     if len(walls) == 0 and len(windows) < 2:
@@ -65,7 +65,7 @@ def separated(
 # Masks
 
 
-def _merged(masks: Iterable[Mask]) -> list[Mask]:
+def merged_masks(masks: Iterable[Mask]) -> list[Mask]:
     """Masks with those on the same grid made one."""
     merged: dict[tuple[bytes, bytes], Mask] = {}
     for mask in masks:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
 from .exit_codes import ExitCode
+from .options import Where, with_options
 from .outputs import require_outputs
-from .question import HeightBand, Layers, Question, Start, Weights, Where
+from .question import Question, scenario_of
 
 if TYPE_CHECKING:
     from ..eikonal import DistanceField
@@ -51,20 +52,16 @@ class Outputs:
             plot_field(field, self.plot)
 
 
+@with_options(
+    "map",
+    "route",
+    "constraints",
+    also=["planner_spacing"],
+    without=["route_goal", "route_all_goals", "route_via"],
+)
 def field_command(
     where: Where,
-    start: Start = None,
-    spacing: Annotated[
-        float | None,
-        typer.Option(
-            metavar="D",
-            help="Of the nodes, map units [default: a 250th of the region's longer side, or a cell "
-            "of a finer map].",
-        ),
-    ] = None,
-    height_band: HeightBand = None,
-    layer: Layers = None,
-    weight: Weights = None,
+    given: dict[str, dict[str, Any]],
     output: Annotated[
         list[Path] | None,
         typer.Option(metavar="FILE", help="Write .tif (GeoTIFF) or .npz; may be repeated."),
@@ -75,19 +72,18 @@ def field_command(
 ) -> int:
     """Compute the distance field: the least length from the start to every node of a lattice.
 
-    Exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written).
+    Of a scenario file only the map, the start, the bounds, the constraints and the spacing
+    count. Exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written).
     """
     outputs = Outputs(output or [], plot)
     outputs.check()
-    question = Question(
-        where=where, start=start, height_band=height_band, layers=layer, weights=weight
-    )
-    problem = question.problem_to_itself()
-    from ..eikonal import distance_field
+    scenario = scenario_of(where, given)
+    from ..eikonal import field_of
     from .report import print_field
 
+    problem = Question(scenario).problem_to_itself()
     started = time.perf_counter()
-    field = distance_field(problem.surface, problem.start, bounds=problem.bounds, spacing=spacing)
+    field = field_of(problem, spacing=scenario.planner.spacing)
     print_field(problem, field, time.perf_counter() - started)
     outputs.write(field)
     return ExitCode.SOLVED

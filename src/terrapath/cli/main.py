@@ -13,9 +13,12 @@ from .benchmark import benchmark_command
 from .check import check_command
 from .exit_codes import ExitCode
 from .field import field_command
+from .init import init_command
 from .plan import plan_command
+from .remarks import remark, remarks
 from .reproduce import reproduce_command
 from .scenes import scenes_command
+from .schema import schema_command
 
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
 # its usage errors is reached through the one it exports.
@@ -32,6 +35,8 @@ app = typer.Typer(
 app.command("plan")(plan_command)
 app.command("check")(check_command)
 app.command("field")(field_command)
+app.command("init")(init_command)
+app.command("schema")(schema_command)
 app.command("scenes")(scenes_command)
 app.command("reproduce")(reproduce_command)
 app.command("benchmark")(benchmark_command)
@@ -54,7 +59,7 @@ def _root(
 
 def _fail(message: str) -> int:
     """One line on standard error."""
-    print("terrapath:", " ".join(message.split()), file=sys.stderr)
+    remark(message)
     return ExitCode.BAD_INPUT
 
 
@@ -62,7 +67,8 @@ def run(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; no error escapes as a traceback."""
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        return app(given or ["--help"], standalone_mode=False) or ExitCode.SOLVED
+        with remarks():
+            return app(given or ["--help"], standalone_mode=False) or ExitCode.SOLVED
     except UsageError as error:
         return _fail(error.format_message())
     except TerrapathError as error:

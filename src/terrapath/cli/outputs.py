@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import MapError
+from ..options import OutputSection
+from .remarks import remark
+
+if TYPE_CHECKING:
+    from ..problem import Problem, Solution
 
 
 def require_outputs(paths: Sequence[Path]) -> None:
@@ -22,3 +29,87 @@ def require_ending(path: Path, option: str, ending: str) -> None:
     """Raise MapError for another ending than the one there is."""
     if path.suffix.lower() != ending:
         raise MapError(f"{option}={str(path)!r} has no known format; end it in {ending}")
+
+
+def _path(text: str | None) -> Path | None:
+    return None if text is None else Path(text)
+
+
+def numbered(path: Path, count: int) -> list[Path]:
+    """The path itself, or one for each of several legs: proof-1.npz, proof-2.npz."""
+    if count == 1:
+        return [path]
+    return [path.with_name(f"{path.stem}-{k}{path.suffix}") for k in range(1, count + 1)]
+
+
+@dataclass(frozen=True)
+class RouteOutputs:
+    """Where the route goes. legs : of the tour that is planned."""
+
+    asked: OutputSection
+    legs: int = 1
+
+    @property
+    def files(self) -> list[Path]:
+        """Of the route, in its formats."""
+        return [Path(file) for file in self.asked.files]
+
+    @property
+    def certificates(self) -> list[Path]:
+        """One for each leg."""
+        path = _path(self.asked.certificate)
+        return [] if path is None else numbered(path, self.legs)
+
+    def check(self) -> None:
+        """Find out before the planning whether all can be written."""
+        from ..io.routes import require_known_format
+
+        asked = self.asked
+        for path in self.files:
+            require_known_format(path)
+        pictures = [Path(picture) for picture in (asked.plot, asked.profile) if picture is not None]
+        if pictures:
+            from ..plotting.figure import require_known_picture
+
+            for picture in pictures:
+                require_known_picture(picture)
+        pages = [] if asked.page is None else [Path(asked.page)]
+        for page in pages:
+            from ..plotting.page import require_known_page
+
+            require_known_page(page)
+        for certificate in self.certificates:
+            require_ending(certificate, "certificate", ".npz")
+        require_outputs([*self.files, *pictures, *pages, *self.certificates])
+
+    def require_fit(self, problem: Problem) -> None:
+        """Raise MapError where a format cannot hold a route on this plane."""
+        from ..io.routes import require_fitting_format
+
+        for path in self.files:
+            require_fitting_format(path, problem.surface.georeference)
+
+    def write(self, solution: Solution) -> None:
+        """Write every file that there is something to write into."""
+        from ..io import write_route
+
+        asked = self.asked
+        for path in self.files:
+            write_route(solution, path)
+        for path, leg in zip(self.certificates, solution.legs or [solution], strict=False):
+            if leg.certificate is None:
+                remark(f"no bound was proven to write a certificate of into {path}")
+            else:
+                leg.certificate.save(path)
+        if asked.plot is not None:
+            from ..plotting import plot_route
+
+            plot_route(solution, asked.plot)
+        if asked.profile is not None:
+            from ..plotting import plot_profile
+
+            plot_profile(solution, asked.profile)
+        if asked.page is not None:
+            from ..plotting import plot_page
+
+            plot_page(solution, asked.page)

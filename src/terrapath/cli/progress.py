@@ -42,11 +42,12 @@ def progress_bar(problem: Problem, quiet: bool) -> Iterator[Callback | None]:
 
 
 def _describe(progress: Progress, unit: str) -> str:
-    """What is being done, and how good the best is."""
+    """Which leg it is, what is being done, and how good the best is."""
+    leg = f"{progress.leg}: " if progress.leg else ""
     if math.isfinite(progress.gap):
-        return f"{progress.stage}, gap {percent(progress.gap)}"
+        return f"{leg}{progress.stage}, gap {percent(progress.gap)}"
     if progress.stage != SEARCHING:
-        return progress.stage
+        return leg + progress.stage
     if math.isfinite(progress.best_cost):
-        return f"best {progress.best_cost:,.6g} {unit}".rstrip()
-    return "no path yet"
+        return f"{leg}best {progress.best_cost:,.6g} {unit}".rstrip()
+    return f"{leg}no path yet"

@@ -9,7 +9,10 @@ import numpy as np
 
 from ..certificate import Certificate
 from ..eikonal import DistanceField
-from ..problem import Problem, Solution, Status
+from ..planners import GoalAnswer
+from ..problem import Path, Problem, Solution, Status
+from ..surface import Layer, Surface
+from .records import goal_state
 
 # Of the routes that a planner found besides the best, so many are shown.
 MOST_ALTERNATIVES = 5
@@ -62,14 +65,17 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
     unit = problem.surface.unit
     yield "true length", _amount(length, unit)
     if solution.lower_bound is not None and solution.gap is not None:
-        yield "lower bound", _amount(solution.lower_bound, unit) + "; no path is shorter"
+        which = "path through these points" if solution.legs else "path"
+        yield "lower bound", _amount(solution.lower_bound, unit) + f"; no {which} is shorter"
         yield "gap", _gap(solution.gap, target_gap)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
     assert solution.cost is not None
     yield "planner's cost", _amount(solution.cost, unit)
-    yield "straight-line length", _amount(problem.straight_length, unit)
+    straight = sum(leg.problem.straight_length for leg in solution.legs or [solution])
+    yield "straight-line length", _amount(straight, unit)
     yield "climb", _amount(path.climb, problem.surface.layers[0].unit)
+    yield from _contributions(path)
     if solution.alternatives:
         others = solution.alternatives[:MOST_ALTERNATIVES]
         yield "next best", ", ".join(_longer(other.length, length, unit) for other in others)
@@ -77,18 +83,92 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
 
 def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, str]]:
     problem = solution.problem
+    surface = problem.surface
     yield "status", f"{solution.status.value} ({solution.stopped_by})"
     yield "planner", solution.planner
     yield "start", _point(problem, problem.start)
+    for leg in solution.legs[:-1]:
+        yield "via", _point(problem, leg.problem.goal)
     yield "goal", _point(problem, problem.goal)
-    if problem.surface.georeference is not None:
-        yield "planned in", problem.surface.georeference.name
-    yield "surface", ", ".join(map(str, problem.surface.layers)) + f"; {problem.surface.fit}"
+    if surface.georeference is not None:
+        yield "planned in", surface.georeference.name
+    yield from _fit(surface)
+    for layer in surface.layers:
+        yield f"layer {layer.name}", _weight(layer, surface.unit)
+    for layer in getattr(surface, "costs", ()):
+        yield f"cost {layer.name}", _exponent(layer)
+    yield from _constraints(problem)
     yield from _lengths(solution, target_gap)
     yield "samples", f"{solution.samples:,}"
     yield "seconds", f"{solution.seconds:.3f}"
     if solution.counters:
         yield "counters", _counter_line(solution)
+    yield "memory", f"{_peak_memory():,.0f} MB at most"
+
+
+def _each(surface: Surface, values: Iterable[float]) -> str:
+    """A number of each layer, with its name and unit."""
+    layers = (*surface.layers, *getattr(surface, "costs", ()))
+    shown = zip(layers, values, strict=False)
+    return ", ".join(f"{layer.name} {value:.2g} {layer.unit}".rstrip() for layer, value in shown)
+
+
+def _fit(surface: Surface) -> Iterator[tuple[str, str]]:
+    """How the surface was made of what was given, and how far it is from that."""
+    fit = surface.fit
+    unit = surface.layers[0].unit if len(surface.layers) == 1 else "in the layers' units"
+    exact = fit.value_error == 0.0
+    yield "surface", fit.method if exact else f"{fit.method}; error {fit.value_error:.2g} {unit}"
+    if fit.smoothing is not None:
+        largest = _each(surface, fit.smoothing.largest_change)
+        yield (
+            "smoothed",
+            f"over {_amount(fit.smoothing.scale, surface.unit)}; moved by at most {largest}; "
+            f"rms {_each(surface, fit.smoothing.rms_change)}",
+        )
+
+
+def _weight(layer: Layer, unit: str) -> str:
+    """What a change of the layer costs, in words."""
+    one = f"1 {layer.unit}" if layer.unit else "1"
+    if layer.weight == 0.0:
+        return "counts for nothing: its weight is 0"
+    return f"a change of {one} counts as {layer.weight:g}{' ' + unit if unit else ''} of way"
+
+
+def _exponent(layer: Layer) -> str:
+    """What the level of a cost does, in words."""
+    power = "" if layer.weight == 1.0 else f" to the power of {layer.weight:g}"
+    return f"its level{power} multiplies the length"
+
+
+def _contributions(path: Path) -> Iterator[tuple[str, str]]:
+    """What share of the length each layer makes."""
+    shares = getattr(path, "contributions", None)
+    if shares:
+        parts = (f"{percent(share)} {name}" for name, share in shares.items())
+        yield "length made of", ", ".join(parts)
+
+
+def _constraints(problem: Problem) -> Iterator[tuple[str, str]]:
+    """What the route has to mind besides the edge of the map."""
+    unit = problem.surface.unit
+    if problem.obstacles:
+        yield "obstacles", f"{len(problem.obstacles):,}"
+    if problem.radius:
+        yield "vehicle radius", _amount(problem.radius, unit) + ", kept from everything blocked"
+    if problem.max_slope is not None:
+        yield "steepest ground", f"{problem.max_slope:g} degrees"
+    if problem.keep_in is not None:
+        yield "keep-in area", f"{problem.keep_in.area:,.6g} {unit}^2" if unit else "given"
+
+
+def _peak_memory() -> float:
+    """Of this process since it began, MB."""
+    import resource
+
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak * (1e-6 if sys.platform == "darwin" else 1.024e-3)
 
 
 def _print_table(rows: Iterable[tuple[str, str]]) -> None:
@@ -104,12 +184,71 @@ def _print_table(rows: Iterable[tuple[str, str]]) -> None:
     Console(highlight=False).print(table)
 
 
-def print_report(solution: Solution, target_gap: float | None = None) -> None:
-    """Print the table on standard output, and what went wrong on standard error.
+def _print_parts(heading: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
+    """A table of legs or goals, a line each."""
+    from rich.console import Console
+    from rich.table import Table
 
-    target_gap : the gap that was asked for, if any.
+    table = Table(box=None, pad_edge=False, title=heading, title_justify="left")
+    for name in header:
+        table.add_column(name, justify="left" if name in {"to", "status"} else "right")
+    for row in rows:
+        table.add_row(*row)
+    console = Console(highlight=False)
+    console.print()
+    console.print(table)
+
+
+def _optional(value: float | None, unit: str) -> str:
+    return "-" if value is None or not np.isfinite(value) else _amount(value, unit)
+
+
+def _print_legs(solution: Solution) -> None:
+    unit = solution.problem.surface.unit
+    rows = [
+        (
+            str(k),
+            _place(leg.problem.goal),
+            leg.status.value,
+            _optional(leg.length, unit),
+            _optional(leg.lower_bound, unit),
+            "-" if leg.gap is None else percent(leg.gap),
+        )
+        for k, leg in enumerate(solution.legs, start=1)
+    ]
+    _print_parts("Legs", ("leg", "to", "status", "length", "lower bound", "gap"), rows)
+
+
+def _print_goals(goals: Iterable[GoalAnswer], surface: Surface) -> None:
+    rows = [
+        (
+            str(k),
+            _place(answer.goal),
+            goal_state(answer),
+            _optional(None if answer.solution is None else answer.solution.length, surface.unit),
+            _optional(answer.least, surface.unit),
+        )
+        for k, answer in enumerate(goals, start=1)
+    ]
+    _print_parts("Goals", ("goal", "to", "status", "length", "no way is shorter than"), rows)
+
+
+def _place(point: tuple[float, float]) -> str:
+    return f"{point[0]:.10g}, {point[1]:.10g}"
+
+
+def print_report(
+    solution: Solution, target_gap: float | None = None, goals: Iterable[GoalAnswer] = ()
+) -> None:
+    """Print the tables on standard output, and what went wrong on standard error.
+
+    target_gap : the gap that was asked for, if any. goals : where there are several.
     """
     _print_table(_rows(solution, target_gap))
+    if solution.legs:
+        _print_legs(solution)
+    if answers := list(goals):
+        _print_goals(answers, solution.problem.surface)
     if solution.status is not Status.SOLVED:
         reason = f"{solution.status.message} (stopped by: {solution.stopped_by})"
         print(f"terrapath: {reason}", file=sys.stderr)

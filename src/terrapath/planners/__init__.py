@@ -5,6 +5,7 @@ from .fast_marching import FastMarching
 from .finishing import Finished, UnfinishedWarning, finish
 from .geodesic_traversal import Fan, GeodesicTraversal
 from .grid_search import AStar, Dijkstra
+from .itinerary import GoalAnswer, nearest, plan_goals, plan_tour
 from .optimal import Optimal
 from .registry import PLANNERS, make_finished, make_planner, plan
 from .rrt import RRT
@@ -19,6 +20,7 @@ __all__ = [
     "FastMarching",
     "Finished",
     "GeodesicTraversal",
+    "GoalAnswer",
     "Optimal",
     "Planner",
     "Progress",
@@ -27,5 +29,8 @@ __all__ = [
     "finish",
     "make_finished",
     "make_planner",
+    "nearest",
     "plan",
+    "plan_goals",
+    "plan_tour",
 ]

@@ -29,6 +29,7 @@ class Progress(NamedTuple):
     best_cost: float  # map units, infinite before the first path
     lower_bound: float = 0.0  # map units, 0 before one is proven
     stage: str = SEARCHING
+    leg: str = ""  # of a tour, in words
 
     @property
     def gap(self) -> float:

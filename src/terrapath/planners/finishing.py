@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 
 from ..bounding import lower_bound
 from ..certificate import Certificate
+from ..errors import TerrapathWarning
 from ..problem import Problem, Solution, Status
 from ..refinement import refine
 from ..validation import require_bool, require_positive
 from .base import INTERRUPT, PROVING, REFINING, Callback, Planner, Progress
 
 
-class UnfinishedWarning(RuntimeWarning):
+class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded, and is given as it was before."""
 
 

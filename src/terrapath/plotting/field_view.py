@@ -21,6 +21,8 @@ HATCH = "////"
 
 def _as_problem(field: DistanceField) -> Problem:
     """The ground of a field, as a problem that starts and ends at its source."""
+    if field.problem is not None:
+        return field.problem
     space, nodata = field.free_space, field.surface.nodata
     masks = [mask for mask in space.masks if mask is not nodata]
     obstacles = [*space.geometries, *space.circles, *masks]
@@ -64,3 +66,5 @@ def draw_distances(axes: Any, field: DistanceField) -> None:
     if values.count() and values.max() > 0.0:
         _draw_lines(axes, field, values, problem.surface.unit)
     draw_start(axes, problem)
+    if len(axes.get_legend_handles_labels()[1]) > 1:  # more than the start needs a word
+        axes.legend(loc="upper left", fontsize=8, framealpha=0.85).set_zorder(7)

@@ -12,10 +12,11 @@ from ..eikonal import DistanceField
 from ..errors import MapError
 from ..files import written_whole
 from ..problem import Solution
+from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
 from .map_view import draw_map
 from .perspective import draw_perspective
-from .terrain import format_length
+from .terrain import format_length, in_words
 
 DOTS_PER_INCH = 140
 PANEL_WIDTH = 5.4  # inches
@@ -26,7 +27,7 @@ FORMATS = (".png", ".svg", ".pdf", ".jpg")
 def _title(solution: Solution) -> str:
     problem = solution.problem
     unit, length = problem.surface.unit, solution.length
-    name = f"{problem.name}: " if problem.name else ""
+    name = f"{in_words(problem.name)}: " if problem.name else ""
     if length is None:
         return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
     saved = 1.0 - length / problem.straight_length if problem.straight_length else 0.0
@@ -72,6 +73,18 @@ def draw_field(field: DistanceField) -> Any:
     return figure
 
 
+def draw_profile(solution: Solution) -> Any:
+    """A matplotlib figure: height, slope and further layers along the route."""
+    from matplotlib.figure import Figure
+
+    if solution.path is None:
+        raise MapError("there is no profile to draw: no path was found")
+    figure = Figure(figsize=chart_size(solution.path), layout="constrained")
+    draw_charts(figure, solution, solution.path)
+    figure.suptitle(_title(solution), fontsize=12)
+    return figure
+
+
 def require_known_picture(path: Path) -> None:
     """Raise MapError for an ending that is no picture format."""
     if path.suffix.lower() not in FORMATS:
@@ -81,6 +94,11 @@ def require_known_picture(path: Path) -> None:
 def plot_route(solution: Solution, path: str | Path) -> None:
     """Draw a solution into a picture file, whole or not at all."""
     _save(lambda: draw_route(solution), Path(path))
+
+
+def plot_profile(solution: Solution, path: str | Path) -> None:
+    """Draw the elevation and slope profile of a route into a picture file, whole or not at all."""
+    _save(lambda: draw_profile(solution), Path(path))
 
 
 def plot_field(field: DistanceField, path: str | Path) -> None:

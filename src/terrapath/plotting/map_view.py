@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import shapely
 from matplotlib import patheffects
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PatchCollection
@@ -12,8 +13,9 @@ from matplotlib.patches import Circle as Disc
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from scipy.ndimage import gaussian_filter
-from shapely import LineString, Polygon
+from shapely import LineString, Point, Polygon
 
+from ..free_space import Parts, sort_obstacles
 from ..problem import Problem, Solution
 from .terrain import LAYER_COLOURS, Terrain, format_length, height_colours, label_axes
 
@@ -27,6 +29,12 @@ PATH_COLOUR = "#e4002b"
 ALTERNATIVE_COLOURS = ("#0b3dff", "#8a2be2", "#d95f02", "#00868b", "#6b4226")
 MARKS = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
 OBSTACLE_STYLE: dict[str, Any] = {"facecolor": "#3b3b3b", "edgecolor": "black", "linewidth": 0.8}
+# Overlapping margins are drawn as one where they have no more corners.
+MOST_JOINED = 100_000
+OBSTACLE_COLOUR = (0.23, 0.23, 0.23, 0.9)
+MARGIN_COLOUR = (0.23, 0.23, 0.23, 0.35)
+STEEP_COLOUR = (0.42, 0.12, 0.52, 0.55)
+OUTSIDE_STYLE: dict[str, Any] = {"facecolor": "#ffffffa0", "edgecolor": "#606060", "hatch": "xxx"}
 
 
 def _outline(polygon: Polygon) -> PathPatch:
@@ -36,16 +44,66 @@ def _outline(polygon: Polygon) -> PathPatch:
 
 
 def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain) -> None:
-    """Polygons, discs, walls and blocked cells."""
-    space = problem.free_space
-    patches = [_outline(g) for g in space.geometries if isinstance(g, Polygon)]
-    discs = [Disc((c.x1, c.x2), c.radius) for c in space.circles]
-    axes.add_collection(PatchCollection([*patches, *discs], zorder=3, **OBSTACLE_STYLE))
-    walls = [np.asarray(g.coords) for g in space.geometries if isinstance(g, LineString)]
-    axes.add_collection(LineCollection(walls, colors="black", linewidths=2.0, zorder=3))
+    """Polygons, discs, walls and blocked cells as given; around them what the radius adds."""
+    constraints = problem.constraints
+    _draw_margins(axes, problem, terrain)
+    if constraints.outside is not None:
+        parts = [part for part in shapely.get_parts(constraints.outside) if not part.is_empty]
+        patches = PatchCollection(map(_outline, parts), zorder=2.9, linewidth=0.8, **OUTSIDE_STYLE)
+        axes.add_collection(patches)
+        _explain(axes, "outside keep-in", OUTSIDE_STYLE["facecolor"], "#606060")
+    if terrain.steep.any():
+        _tint(axes, problem, terrain.steep, STEEP_COLOUR)
+        _explain(axes, f"steeper than {problem.max_slope:g}°", STEEP_COLOUR)
+    _draw_solid(axes, sort_obstacles(constraints.obstacles))
     if terrain.masked.any():
-        shown = np.where(terrain.masked[..., None], [0.23, 0.23, 0.23, 0.9], 0.0)
-        axes.imshow(shown, extent=_extent(problem), origin="lower", zorder=3)
+        _tint(axes, problem, terrain.masked, OBSTACLE_COLOUR)
+
+
+def _draw_solid(axes: Any, parts: Parts) -> None:
+    """Geometries and discs as they were given."""
+    patches = [_outline(g) for g in parts.geometries if isinstance(g, Polygon)]
+    discs = [Disc((c.x1, c.x2), c.radius) for c in parts.circles]
+    axes.add_collection(PatchCollection([*patches, *discs], zorder=3, **OBSTACLE_STYLE))
+    walls = [np.asarray(g.coords) for g in parts.geometries if isinstance(g, LineString)]
+    axes.add_collection(LineCollection(walls, colors="black", linewidths=2.0, zorder=3))
+    points = np.array([g.coords[0] for g in parts.geometries if isinstance(g, Point)])
+    if len(points):
+        axes.plot(*points.T, ".", color="black", ms=4, zorder=3)
+
+
+def _draw_margins(axes: Any, problem: Problem, terrain: Terrain) -> None:
+    """What lies within the vehicle's radius of an obstacle, all in one tone."""
+    if problem.radius == 0.0:
+        return
+    space = problem.free_space
+    discs = [shapely.Point(c.x1, c.x2).buffer(c.radius) for c in space.circles]
+    shapes = np.array([*space.geometries, *discs], np.object_)
+    if shapely.get_num_coordinates(shapes).sum() < MOST_JOINED:
+        shapes = shapely.get_parts(shapely.union_all(shapes))
+    patches = PatchCollection(
+        [_outline(g) for g in shapes if isinstance(g, Polygon)],
+        facecolor=MARGIN_COLOUR,
+        edgecolor="black",
+        linewidth=0.4,
+        zorder=2.8,
+    )
+    axes.add_collection(patches)
+    if terrain.in_mask_margin.any():
+        _tint(axes, problem, terrain.in_mask_margin, MARGIN_COLOUR)
+    if len(shapes) or space.masks:
+        label = f"radius {problem.radius:g} {problem.surface.unit}".rstrip()
+        _explain(axes, label, MARGIN_COLOUR)
+
+
+def _tint(axes: Any, problem: Problem, cells: Any, colour: tuple[float, ...]) -> None:
+    shown = np.where(cells[..., None], colour, 0.0)
+    axes.imshow(shown, extent=_extent(problem), origin="lower", zorder=2.8)
+
+
+def _explain(axes: Any, text: str, colour: Any, edge: Any = "none") -> None:
+    """An entry of the legend for a tone of the map."""
+    axes.plot([], [], "s", color=colour, ms=9, markeredgecolor=edge, label=text)
 
 
 def _extent(problem: Problem) -> tuple[float, float, float, float]:

@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from ..problem import Solution
 from ..validation import Array
-from .map_view import PATH_COLOUR
+from .map_view import MARGIN_COLOUR, OBSTACLE_COLOUR, PATH_COLOUR, STEEP_COLOUR
 from .terrain import LAYER_COLOURS, Terrain, height_colours, label_axes
 
 SAMPLES = 180
@@ -78,7 +78,9 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     layer = 1 if len(terrain.values) > 1 else 0
     grid_x, grid_y = np.meshgrid(terrain.x, terrain.y)
     colours = terrain.shaded(layer)
-    colours[terrain.blocked] = 0.23
+    _tint(colours, terrain.blocked, MARGIN_COLOUR)
+    _tint(colours, terrain.steep, STEEP_COLOUR)
+    _tint(colours, terrain.solid, OBSTACLE_COLOUR)
     axes.set_proj_type("ortho")
     axes.computed_zorder = False
     axes.plot_surface(
@@ -115,6 +117,12 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
         axes.text2D(
             0.02, 0.95, f"heights drawn {exaggeration:.1f} times", transform=axes.transAxes, size=8
         )
+
+
+def _tint(colours: Array, cells: npt.NDArray[np.bool_], tone: tuple[float, ...]) -> None:
+    """Lay a translucent tone over some of the ground."""
+    *tint, opacity = tone
+    colours[cells] = (1.0 - opacity) * colours[cells] + opacity * np.array(tint)
 
 
 def _few_ticks() -> Any:

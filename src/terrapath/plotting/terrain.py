@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +14,13 @@ from matplotlib import colormaps
 from matplotlib.colors import LightSource, Normalize
 from matplotlib.ticker import FuncFormatter
 
+from ..free_space import Circle, sort_obstacles
+from ..io.routes.profile import clean
 from ..problem import Problem
+from ..surface import Mask
 from ..validation import Array
+
+Cells: TypeAlias = npt.NDArray[np.bool_]
 
 HEIGHT_COLOURS = "gist_earth"
 LAYER_COLOURS = "plasma"
@@ -45,39 +51,74 @@ class Terrain:
         return cls(problem, x, y, np.moveaxis(problem.surface.values(points), -1, 0))
 
     @cached_property
-    def blocked(self) -> npt.NDArray[np.bool_]:
+    def blocked(self) -> Cells:
         """(ny, nx): samples that are not free."""
         space = self.problem.free_space
-        x, y = np.meshgrid(self.x, self.y)
-        found = self.masked.copy()
-        for circle in space.circles:
-            found |= np.hypot(x - circle.x1, y - circle.x2) <= circle.radius
-        for geometry in space.geometries:
-            found |= shapely.contains_xy(geometry, x, y)
-        return found
+        return self._inside(space.geometries, space.circles, space.masks)
 
     @cached_property
-    def masked(self) -> npt.NDArray[np.bool_]:
-        """(ny, nx): samples in a mask's blocked cells."""
+    def solid(self) -> Cells:
+        """(ny, nx): samples in an obstacle as it was given, or without data."""
+        constraints = self.problem.constraints
+        parts = sort_obstacles(constraints.obstacles)
+        nodata = [] if constraints.nodata is None else [constraints.nodata]
+        return self._inside(parts.geometries, parts.circles, [*parts.masks, *nodata])
+
+    @cached_property
+    def masked(self) -> Cells:
+        """(ny, nx): samples in a blocked cell of a mask that was given, or without data."""
+        constraints = self.problem.constraints
+        given = [*constraints.obstacles, constraints.nodata]
+        return self._inside([], [], [mask for mask in given if isinstance(mask, Mask)])
+
+    @cached_property
+    def steep(self) -> Cells:
+        """(ny, nx): samples on ground that is too steep."""
+        mask = self.problem.constraints.steep
+        return self._inside([], [], [] if mask is None else [mask])
+
+    @cached_property
+    def in_mask_margin(self) -> Cells:
+        """(ny, nx): samples that are nearer than the radius to a blocked cell, but not in one."""
+        inflated = self._inside([], [], self.problem.free_space.masks)
+        return inflated & ~self.masked & ~self.steep
+
+    def _inside(
+        self, geometries: Sequence[Any] | Any, circles: Sequence[Circle], masks: Sequence[Mask]
+    ) -> Cells:
+        """(ny, nx): samples in any of the obstacles."""
         found = np.zeros((len(self.y), len(self.x)), bool)
-        for mask in self.problem.free_space.masks:
-            dx, dy = mask.spacing
-            i = np.floor((self.x - mask.x[0]) / dx + 0.5).astype(int)
-            j = np.floor((self.y - mask.y[0]) / dy + 0.5).astype(int)
-            rows, columns = mask.blocked.shape
-            ok = np.ix_((j >= 0) & (j < rows), (i >= 0) & (i < columns))
-            cells = mask.blocked[np.clip(j, 0, rows - 1)][:, np.clip(i, 0, columns - 1)]
-            found[ok] |= cells[ok]
+        for mask in masks:
+            found |= self._in_mask(mask)
+        x, y = np.meshgrid(self.x, self.y)
+        for circle in circles:
+            found |= np.hypot(x - circle.x1, y - circle.x2) <= circle.radius
+        if len(geometries):
+            samples = shapely.points(x.ravel(), y.ravel())
+            held, _ = shapely.STRtree(geometries).query(samples, predicate="within")
+            found.ravel()[held] = True
+        return found
+
+    def _in_mask(self, mask: Mask) -> Cells:
+        found = np.zeros((len(self.y), len(self.x)), bool)
+        dx, dy = mask.spacing
+        i = np.floor((self.x - mask.x[0]) / dx + 0.5).astype(int)
+        j = np.floor((self.y - mask.y[0]) / dy + 0.5).astype(int)
+        rows, columns = mask.blocked.shape
+        ok = np.ix_((j >= 0) & (j < rows), (i >= 0) & (i < columns))
+        cells = mask.blocked[np.clip(j, 0, rows - 1)][:, np.clip(i, 0, columns - 1)]
+        found[ok] = cells[ok]
         return found
 
     def label(self, layer: int) -> str:
         """Name and unit of a layer."""
         shown = self.problem.surface.layers[layer]
-        return f"{shown.name} ({shown.unit})" if shown.unit else shown.name
+        return with_unit(shown.name, shown.unit)
 
     def norm(self, layer: int) -> Normalize:
         """Colour scale over the part of a layer that is not blocked."""
-        values = self.values[layer][~self.masked]
+        shown = ~self.masked
+        values = self.values[layer][shown if shown.any() else ~shown]
         low, high = float(values.min()), float(values.max())
         return Normalize(low, high if high > low else low + 1.0)
 
@@ -101,6 +142,16 @@ class Terrain:
             dy=-float(self.y[1] - self.y[0]),
         )
         return np.clip(np.asarray(lit, np.float64), 0.0, 1.0)
+
+
+def in_words(text: str) -> str:
+    """A name that came with a map, for matplotlib, to which dollar signs are mathematics."""
+    return clean(text).replace("$", r"\$")
+
+
+def with_unit(name: str, unit: str, gap: str = " ") -> str:
+    """A name with its unit, as axes show it."""
+    return f"{in_words(name)}{gap}({in_words(unit)})" if unit else in_words(name)
 
 
 def height_colours() -> Any:

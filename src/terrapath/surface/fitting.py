@@ -8,13 +8,21 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.linalg import solveh_banded
 from scipy.stats import qmc
 
 from .._kernels.surfaces import Spline, fill_jets, fill_values
 from ..errors import FitError, InputError
 from ..validation import Array, Bounds
 from .mask import uniform_spacing
-from .smoothing import FEATURES_PER_SCALE, Smoothing, smooth
+from .smoothing import (
+    FEATURES_PER_SCALE,
+    ChangeMeter,
+    Smoothing,
+    blocks,
+    smooth,
+    smooth_in_place,
+)
 
 Function = Callable[[Array, Array], Array]
 
@@ -51,35 +59,70 @@ class FunctionFit(NamedTuple):
     smoothing: Smoothing | None = None
 
 
-def _coefficients(values: Array, spacing: float, axis: int) -> Array:
-    """Uniform cubic B-spline coefficients along one axis, two more than there are values.
+def _curvatures(f: Array) -> Array:
+    """Second derivatives h^2 f'' (n, m) of the interpolating splines through columns f (n, m).
 
-    The interpolating spline f is SciPy's, with not-a-knot ends. On uniform knots its
-    coefficients are c_j = f(x_j) - h^2/6 f''(x_j), and the outermost two follow from
-    f(x_j) = (c_(j-1) + 4 c_j + c_(j+1)) / 6.
+    At inner knots m_(j-1) + 4 m_j + m_(j+1) = 6 (f_(j-1) - 2 f_j + f_(j+1)). With not-a-knot
+    ends m_0 = 2 m_1 - m_2, which makes m_1 the second difference itself, and so at the end.
     """
-    f = np.moveaxis(values, axis, 0)
-    knots = spacing * np.arange(len(f))
-    inner = f - spacing**2 / 6.0 * CubicSpline(knots, f)(knots, 2)
-    first = 6.0 * f[0] - 4.0 * inner[0] - inner[1]
-    last = 6.0 * f[-1] - 4.0 * inner[-1] - inner[-2]
-    return np.moveaxis(np.concatenate([first[None], inner, last[None]]), 0, axis)
+    m = np.empty(f.shape, order="F")
+    inner = m[1:-1]
+    np.subtract(f[2:], f[1:-1], out=inner)
+    inner -= f[1:-1]
+    inner += f[:-2]
+    right = 6.0 * m[2:-2]
+    if len(right) > 0:
+        right[0] -= m[1]
+        right[-1] -= m[-2]
+    if len(right) == 1:  # SciPy's solver takes two and more
+        m[2] = 0.25 * right[0]
+    elif len(right) > 1:
+        bands = np.ones((2, len(right)))
+        bands[1] = 4.0
+        m[2:-2] = solveh_banded(bands, right, overwrite_b=True, check_finite=False)
+    m[0], m[-1] = 2.0 * m[1] - m[2], 2.0 * m[-2] - m[-3]
+    return m
+
+
+def _to_coefficients(lines: Array) -> None:
+    """Uniform cubic B-spline coefficients (n + 2, m), in place of values in lines[1:-1].
+
+    The interpolating spline f has the coefficients c_j = f(x_j) - h^2/6 f''(x_j), and the
+    outermost two follow from f(x_j) = (c_(j-1) + 4 c_j + c_(j+1)) / 6.
+    """
+    f = np.asfortranarray(lines[1:-1])
+    inner = f - _curvatures(f) / 6.0
+    lines[1:-1] = inner
+    lines[0] = 6.0 * f[0] - 4.0 * inner[0] - inner[1]
+    lines[-1] = 6.0 * f[-1] - 4.0 * inner[-1] - inner[-2]
+
+
+def _padded(values: Array) -> Array:
+    """Values (layers, ny, nx) with room for the outermost coefficients."""
+    layers, ny, nx = values.shape
+    padded = np.empty((layers, ny + 2, nx + 2))
+    padded[:, 1:-1, 1:-1] = values
+    return padded
+
+
+def _spline_of(padded: Array, x: Array, y: Array, weights: Array) -> Spline:
+    """The bicubic spline through the values in ``padded``, which become its coefficients."""
+    for layer in padded:
+        for rows in blocks(layer.shape[0], layer.shape[1]):
+            # The room above and below holds nothing yet.
+            kept = slice(max(rows.start, 1), min(rows.stop, layer.shape[0] - 1))
+            if kept.start < kept.stop:
+                _to_coefficients(layer[kept].T)
+        for columns in blocks(layer.shape[1], layer.shape[0]):
+            _to_coefficients(layer[:, columns])
+    dx, dy = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
+    place = (float(x[0]), float(y[0]), float(dx), float(dy))
+    return Spline(padded, weights, *place, log_cost=np.empty((0, 0, 0)), floor=1.0)
 
 
 def interpolate(values: Array, x: Array, y: Array, weights: Array) -> Spline:
     """The bicubic spline through values (layers, ny, nx) on a uniform grid."""
-    dx, dy = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
-    coefficients = _coefficients(_coefficients(values, dx, 2), dy, 1)
-    return Spline(
-        np.ascontiguousarray(coefficients),
-        weights,
-        float(x[0]),
-        float(y[0]),
-        float(dx),
-        float(dy),
-        log_cost=np.empty((0, 0, 0)),
-        floor=1.0,
-    )
+    return _spline_of(_padded(values), x, y, weights)
 
 
 def _resample(values: Array, x: Array, axis: int) -> tuple[Array, Array]:
@@ -104,19 +147,38 @@ def _at_samples(spline: Spline, x: Array, y: Array) -> Array:
     return found.T.reshape(-1, len(y), len(x))
 
 
+def _largest_error(spline: Spline, x: Array, y: Array, values: Array) -> float:
+    """The largest difference from values (layers, ny, nx) at the samples."""
+    return max(
+        float(np.abs(_at_samples(spline, x, y[rows]) - values[:, rows]).max())
+        for rows in blocks(len(y), len(x))
+    )
+
+
+def _change(scale: float, before: Spline, after: Spline, x: Array, y: Array) -> Smoothing:
+    """What smoothing changed at the samples."""
+    change = ChangeMeter(len(before.weights))
+    for rows in blocks(len(y), len(x)):
+        change.add(_at_samples(after, x, y[rows]) - _at_samples(before, x, y[rows]))
+    return change.smoothing(scale)
+
+
 def fit_grid(values: Array, x: Array, y: Array, weights: Array, scale: float) -> GridFit:
-    """The spline through values (layers, ny, nx), smoothed where the scale is above 0."""
+    """The spline through values (layers, ny, nx), smoothed where the scale is above 0.
+
+    Large maps must fit: beside the values it holds one array of their size, two where it
+    smooths.
+    """
     resampled, fine_x = _resample(values, x, 2)
     resampled, fine_y = _resample(resampled, y, 1)
     spline = interpolate(resampled, fine_x, fine_y, weights)
-    before = _at_samples(spline, x, y)
-    error = float(np.abs(before - values).max())
+    error = _largest_error(spline, x, y, values)
     if scale == 0.0:
         return GridFit(spline, error, None)
-    resampled = smooth(resampled, spline.dx, spline.dy, scale)
-    spline = interpolate(resampled, fine_x, fine_y, weights)
-    change = Smoothing.measured(scale, before, _at_samples(spline, x, y))
-    return GridFit(spline, error, change)
+    padded = _padded(resampled)
+    smooth_in_place(padded[:, 1:-1, 1:-1], spline.dx, spline.dy, scale)
+    smoothed = _spline_of(padded, fine_x, fine_y, weights)
+    return GridFit(smoothed, error, _change(scale, spline, smoothed, x, y))
 
 
 def _require_finite(name: str, values: Array, x: Array, y: Array) -> None:

@@ -3,17 +3,94 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from pyproj import CRS, Transformer
+from pyproj import CRS, Proj, Transformer
 from pyproj.crs import ProjectedCRS
 from pyproj.crs.coordinate_operation import TransverseMercatorConversion
-from pyproj.exceptions import CRSError
+from pyproj.exceptions import CRSError, ProjError
 
 from ..errors import MapError
-from ..validation import Array
+from ..validation import Array, Bounds
+
+# Of lengths, as CRSs and maps write them: metres each.
+LENGTH_UNITS = {
+    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1000.0),
+    **dict.fromkeys(("dm", "decimetre", "decimeter", "decimetres", "decimeters"), 0.1),
+    **dict.fromkeys(("cm", "centimetre", "centimeter", "centimetres", "centimeters"), 0.01),
+    **dict.fromkeys(("mm", "millimetre", "millimeter", "millimetres", "millimeters"), 0.001),
+    **dict.fromkeys(("ft", "foot", "feet", "international foot", "international feet"), 0.3048),
+    **dict.fromkeys(
+        ("us survey foot", "us survey feet", "us-ft", "ftus", "foot_us", "survey foot"),
+        1200.0 / 3937.0,
+    ),
+    **dict.fromkeys(("yd", "yard", "yards"), 0.9144),
+}
+
+
+def metres_of(unit: str) -> float | None:
+    """Length of a unit in metres; None where it is none of length."""
+    return LENGTH_UNITS.get(unit.strip().lower())
+
+
+def parse_crs(text: Any, name: str = "the CRS") -> CRS | None:
+    """A CRS of the plane from whatever names one; None where there is none.
+
+    Of a compound CRS the horizontal part, of a bound one its source. Raises MapError.
+    """
+    if text is None:
+        return None
+    try:
+        crs = text if isinstance(text, CRS) else CRS.from_user_input(text)
+    except (CRSError, ProjError) as error:
+        reason = " ".join(str(error).split())
+        raise MapError(f"{name} is not understood: {reason:.200}") from None
+    while crs.is_compound or crs.is_bound:
+        part = crs.sub_crs_list[0] if crs.is_compound else crs.source_crs
+        assert part is not None
+        crs = part
+    if crs.is_geocentric or crs.is_vertical:
+        raise MapError(
+            f"{name} ({crs.name}) is not one of the plane; give a projected or a geographic CRS"
+        )
+    if crs.geodetic_crs is None:
+        return None  # an engineering CRS: a plane that lies nowhere known
+    if crs.is_geographic and len(crs.axis_info) > 2:
+        crs = crs.to_2d()
+    if crs.is_geographic and any(axis.unit_name != "degree" for axis in crs.axis_info):
+        raise MapError(
+            f"{name} ({crs.name}) counts angles in {crs.axis_info[0].unit_name}; give one in "
+            "degrees, or a projected one"
+        )
+    return crs
+
+
+@cache
+def transformer(source: CRS, target: CRS) -> Transformer:
+    """From one CRS to another, x (longitude) first. Raises MapError where there is no way."""
+    try:
+        return Transformer.from_crs(source, target, always_xy=True)
+    except ProjError as error:
+        reason = " ".join(str(error).split())
+        raise MapError(
+            f"there is no way from the CRS {source.name} to {target.name}: {reason:.120}; "
+            "check that both are of the same body"
+        ) from None
+
+
+def worst_scale(crs: CRS, x: Array, y: Array) -> float:
+    """How far, at worst, lengths on a projection are off at points: 0.01 for 1 %.
+
+    Infinite where the projection does not reach the points.
+    """
+    assert crs.geodetic_crs is not None
+    lonlat = transformer(crs, crs.geodetic_crs).transform(x, y)
+    factors = Proj(crs).get_factors(*lonlat, errcheck=False)
+    scales = np.concatenate([factors.tissot_semimajor, factors.tissot_semiminor])
+    return float(np.abs(scales - 1.0).max()) if np.isfinite(scales).all() else np.inf
 
 
 def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
@@ -90,6 +167,16 @@ class Georeference:
             self._to_map.transform(points[..., 0], points[..., 1], direction="INVERSE"), axis=-1
         )
 
+    def rectangle_from_map(self, bounds: Bounds) -> Bounds:
+        """The upright rectangle of the plane around one of the map's own coordinates."""
+        return Bounds(*self._to_map.transform_bounds(*bounds, direction="INVERSE"))
+
     def to_lonlat(self, points: Array) -> Array:
         """Plane (..., 2) -> longitude and latitude in degrees: WGS 84 on Earth."""
         return np.stack(self._to_lonlat.transform(points[..., 0], points[..., 1]), axis=-1)
+
+    def from_lonlat(self, lonlat: Array) -> Array:
+        """Longitude and latitude in degrees (..., 2), as ``to_lonlat`` gives them -> the plane."""
+        return np.stack(
+            self._to_lonlat.transform(lonlat[..., 0], lonlat[..., 1], direction="INVERSE"), axis=-1
+        )

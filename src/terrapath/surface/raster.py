@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from affine import Affine
 from pyproj import CRS
-from pyproj.exceptions import CRSError
-from scipy.ndimage import distance_transform_edt
 
-from ..errors import MapError
+from ..errors import InputError, MapError
 from ..validation import Array
-from .georeference import Georeference, local_projection
+from .georeference import Georeference
+from .grid import Grid
+from .holes import Cells, continue_into_holes, fill_small_holes, missing_cells
 from .mask import Mask
+from .resampling import resample
 from .surface import Surface
 
 LEAST_CELLS = 4
@@ -36,6 +36,11 @@ class Raster:
     map_crs: CRS | None = None
 
     @classmethod
+    def on(cls, grid: Grid, bands: Array) -> Raster:
+        """Bands on a grid."""
+        return cls(bands, grid.transform, grid.crs, grid.map_crs)
+
+    @classmethod
     def from_extent(
         cls, bands: Array, extent: tuple[float, float, float, float], crs: Any
     ) -> Raster:
@@ -46,79 +51,79 @@ class Raster:
         return cls(bands, from_bounds(*extent, columns, rows), CRS.from_user_input(crs))
 
     @property
-    def is_north_up(self) -> bool:
-        """Are rows and columns parallel to the axes, with x growing along the rows?"""
-        t = self.transform
-        return bool(t.b == 0.0 and t.d == 0.0 and t.a > 0.0)
+    def grid(self) -> Grid:
+        """Where its cells lie."""
+        rows, columns = self.bands.shape[1:]
+        return Grid(rows, columns, self.transform, self.crs, self.map_crs)
 
     def needs_warp(self) -> bool:
         """Is it in degrees or turned, so that it cannot be planned on as it is?"""
-        return not self.is_north_up or (self.crs is not None and self.crs.is_geographic)
-
-    def _place(self, column: float, row: float) -> tuple[float, float]:
-        """Map coordinates of the corner between cells."""
-        t = self.transform
-        return t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
-
-    def _extent(self) -> tuple[float, float, float, float]:
-        rows, columns = self.bands.shape[1:]
-        corners = [self._place(c, r) for c in (0, columns) for r in (0, rows)]
-        x, y = zip(*corners, strict=True)
-        return min(x), min(y), max(x), max(y)
-
-    def _plane(self) -> CRS | None:
-        """The CRS to plan in: a local projection for degrees, its own otherwise."""
-        if self.crs is None or not self.crs.is_geographic:
-            return self.crs
-        west, south, east, north = self._extent()
-        return local_projection(self.crs, 0.5 * (west + east), 0.5 * (south + north))
+        return self.grid.needs_warp
 
     def to_local_metres(self) -> Raster:
         """The same ground on a north-up grid of square cells in a projected CRS (cubic)."""
-        from rasterio.warp import Resampling, calculate_default_transform, reproject
+        target = self.grid.planning_grid()
+        bands = np.empty((len(self.bands), target.rows, target.columns))
+        for band, out in zip(self.bands, bands, strict=True):
+            resample(np.array(band, dtype=np.float64), self.grid, target, out, linear=False)
+        return Raster.on(target, bands).trimmed()
 
-        plane = self._plane()
-        source_crs = self.crs.to_wkt() if self.crs else 'LOCAL_CS["plane"]'
-        plane_crs = plane.to_wkt() if plane else source_crs
-        rows, columns = self.bands.shape[1:]
-        transform, width, height = calculate_default_transform(
-            source_crs, plane_crs, columns, rows, *self._extent()
-        )
-        bands = np.full((len(self.bands), height, width), np.nan)
-        reproject(
-            self.bands,
-            bands,
-            src_transform=self.transform,
-            src_crs=source_crs,
-            src_nodata=np.nan,
-            dst_transform=transform,
-            dst_crs=plane_crs,
-            dst_nodata=np.nan,
-            resampling=Resampling.cubic,
-        )
-        return Raster(bands, transform, plane, self.crs)._trimmed()
-
-    def _trimmed(self) -> Raster:
+    def trimmed(self) -> Raster:
         """Without outer rows and columns that hold no data at all."""
-        some = np.all(np.isfinite(self.bands), axis=0)
-        if not np.any(some):
+        some = ~self._missing()
+        if not some.any():
             return self
-        rows, columns = (np.flatnonzero(np.any(some, axis=axis)) for axis in (1, 0))
-        window = np.s_[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        x, y = self._place(columns[0], rows[0])
-        t = self.transform
-        transform = Affine(t.a, t.b, x, t.d, t.e, y)
-        return Raster(self.bands[window], transform, self.crs, self.map_crs)
+        rows, columns = (np.flatnonzero(some.any(axis=axis)) for axis in (1, 0))
+        kept = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        return Raster.on(self.grid.window(*kept), self.bands[:, kept[0], kept[1]])
+
+    def _missing(self) -> Cells:
+        """Cells that any layer has no data in."""
+        missing = missing_cells(self.bands[0])
+        for band in self.bands[1:]:
+            missing |= missing_cells(band)
+        return missing
 
     def _georeference(self) -> Georeference | None:
         return None if self.crs is None else Georeference(self.crs, self.map_crs or self.crs)
 
-    def _centres(self) -> tuple[Array, Array]:
+    def _southward(self) -> Raster:
+        """Rows from south to north."""
+        if self.transform.e > 0.0:
+            return self
+        return Raster.on(self.grid.flipped(), self.bands[:, ::-1])
+
+    def _require_data(self) -> None:
         rows, columns = self.bands.shape[1:]
-        t = self.transform
-        x: Array = t.c + t.a * (np.arange(columns, dtype=np.float64) + 0.5)
-        y: Array = t.f + t.e * (np.arange(rows, dtype=np.float64) + 0.5)
-        return x, y
+        if min(rows, columns) < LEAST_CELLS:
+            raise MapError(
+                f"the map has {columns} x {rows} cells; "
+                f"a surface needs at least {LEAST_CELLS} x {LEAST_CELLS}"
+            )
+        if self._missing().all():
+            raise MapError("the map holds no data at all: every cell is no-data")
+
+    def _fill(self, size: float, kinds: Sequence[str]) -> Cells:
+        """Fill small holes, continue the ground into large ones; the cells that stay blocked.
+
+        Costs are filled by their logarithms and stay within their range, above 0.
+        """
+        blocked = np.zeros(self.bands.shape[1:], dtype=bool)
+        for band, kind in zip(self.bands, kinds, strict=True):
+            missing = missing_cells(band)
+            if not missing.any():
+                continue
+            if kind == "cost":
+                np.log(band, out=band)
+            low, high = np.nanmin(band), np.nanmax(band)
+            if size > 0.0:
+                fill_small_holes(band, missing, self.transform.a, self.transform.e, size)
+                np.clip(band, low, high, out=band)
+            continue_into_holes(band, missing)
+            if kind == "cost":
+                np.exp(np.clip(band, low, high, out=band), out=band)
+            blocked |= missing
+        return blocked
 
     def to_surface(
         self,
@@ -126,45 +131,36 @@ class Raster:
         names: Sequence[str],
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
+        kinds: Sequence[str] | None = None,
+        fill_holes: float = 0.0,
+        smoothing: float | None = None,
     ) -> Surface:
-        """The spline surface through the cell centres; cells without data are blocked."""
-        x, y = self._centres()
-        bands = self.bands
-        if self.transform.e < 0.0:
-            y, bands = y[::-1], bands[:, ::-1]
-        if min(bands.shape[1:]) < LEAST_CELLS:
-            raise MapError(
-                f"the map has {bands.shape[2]} x {bands.shape[1]} cells; "
-                f"a surface needs at least {LEAST_CELLS} x {LEAST_CELLS}"
+        """The spline surface through the cell centres; cells without data are blocked.
+
+        kinds : "rise" or "cost" of each layer. fill_holes : the longest side of holes that are
+        filled and free, map units.
+        The raster is used up: its cells without data are given values.
+        """
+        raster = self._southward()
+        raster._require_data()
+        blocked = raster._fill(fill_holes, kinds or ["rise"] * len(names))
+        x, y = raster.grid.centres()
+        options: dict[str, Any] = {} if kinds is None else {"kinds": kinds}
+        try:
+            return Surface.from_grid(
+                raster.bands,
+                x,
+                y,
+                smoothing=smoothing,
+                names=names,
+                units=units,
+                weights=weights,
+                nodata=Mask(blocked, x, y) if blocked.any() else None,
+                georeference=raster._georeference(),
+                **options,
             )
-        missing: npt.NDArray[np.bool_] = np.any(~np.isfinite(bands), axis=0)
-        if missing.all():
-            raise MapError("the map holds no data at all: every cell is no-data")
-        return Surface.from_grid(
-            _filled(bands, missing),
-            x,
-            y,
-            names=names,
-            units=units,
-            weights=weights,
-            nodata=Mask(missing, x, y) if missing.any() else None,
-            georeference=self._georeference(),
-        )
-
-
-def _filled(bands: Array, missing: npt.NDArray[np.bool_]) -> Array:
-    """No-data cells take the nearest cell's value: no cliff at their edge, no ringing from it."""
-    if not missing.any():
-        return bands
-    nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-    return np.ascontiguousarray(bands[:, nearest[0], nearest[1]])
-
-
-def parse_crs(text: Any) -> CRS | None:
-    """A CRS as rasterio gives it; None where there is none."""
-    if text is None:
-        return None
-    try:
-        return CRS.from_user_input(text)
-    except CRSError as error:
-        raise MapError(f"the CRS is not understood: {error}") from None
+        except MemoryError:
+            raise InputError(
+                f"a map of {len(x):,} x {len(y):,} cells needs more memory than there is; read a "
+                "part of it (within) or every few cells only (decimate)"
+            ) from None

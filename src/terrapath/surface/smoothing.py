@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +13,17 @@ from ..errors import InputError
 from ..validation import Array, Bounds, require_not_negative
 
 FEATURES_PER_SCALE = 2.0  # a resolution of half a standard deviation, as for Gaussian peaks
+BLOCK = 2**20  # values that are worked on at once
+SLOPE_ERROR = 0.01  # rms slope that rounded heights may leave: 1 %, half a degree
+FEWEST_LEVELS = 16  # of distinct heights, from which their step can be told
+MOST_LOOKED_AT = 1_000_000  # heights that the step is sought in
+
+
+def blocks(count: int, width: int) -> Iterator[slice]:
+    """Slices of ``count`` lines, each of ``width`` values, that hold a block together."""
+    size = max(1, BLOCK // max(width, 1))
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))
 
 
 @dataclass(frozen=True)
@@ -24,10 +37,9 @@ class Smoothing:
     @classmethod
     def measured(cls, scale: float, before: Array, after: Array) -> Smoothing:
         """Compare values (layers, ...) with the smoothed ones."""
-        change = (after - before).reshape(len(before), -1)
-        largest = np.abs(change).max(axis=1)
-        rms = np.sqrt(np.square(change).mean(axis=1))
-        return cls(scale, tuple(map(float, largest)), tuple(map(float, rms)))
+        meter = ChangeMeter(len(before))
+        meter.add(after - before)
+        return meter.smoothing(scale)
 
     def __str__(self) -> str:
         largest, rms = (
@@ -35,6 +47,62 @@ class Smoothing:
             for changes in (self.largest_change, self.rms_change)
         )
         return f"smoothed over {self.scale:g}, change at most {largest}, rms {rms}"
+
+
+class ChangeMeter:
+    """The largest and the rms change of each layer, block by block."""
+
+    def __init__(self, layers: int) -> None:
+        self._largest = np.zeros(layers)
+        self._squares = np.zeros(layers)
+        self._count = 0
+
+    def add(self, change: Array) -> None:
+        """Changes (layers, ...) at further samples."""
+        flat = change.reshape(len(self._largest), -1)
+        np.maximum(self._largest, np.abs(flat).max(axis=1), out=self._largest)
+        self._squares += np.square(flat).sum(axis=1)
+        self._count += flat.shape[1]
+
+    def smoothing(self, scale: float) -> Smoothing:
+        """What was measured."""
+        rms = np.sqrt(self._squares / self._count)
+        return Smoothing(scale, tuple(self._largest.tolist()), tuple(rms.tolist()))
+
+
+def quantisation_step(values: Array) -> float:
+    """The step that heights are rounded to; 0 where they are not, or it cannot be told.
+
+    values : any shape, NaN where unknown. Found where the gaps between all distinct values are
+    multiples of the smallest, to the precision of 32-bit numbers.
+    """
+    flat = values.reshape(-1)
+    looked_at = flat[:: max(1, flat.size // MOST_LOOKED_AT)]
+    levels = np.unique(looked_at[np.isfinite(looked_at)])
+    if len(levels) < FEWEST_LEVELS:
+        return 0.0
+    rounding = float(np.spacing(np.float32(np.abs(levels).max())))
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 2.0 * rounding]
+    # Differences that 32-bit numbers can hardly hold are no step that anybody chose.
+    if len(gaps) == 0 or (least := float(gaps.min())) < 8.0 * rounding:
+        return 0.0
+    multiples = np.rint(gaps / least)
+    step = float(gaps.sum() / multiples.sum())
+    off = np.abs(gaps - multiples * step)
+    return step if float(off.max()) <= 2.0 * rounding + 1e-9 * step else 0.0
+
+
+def scale_for_step(step: float, cell: float) -> float:
+    """The least smoothing, map units, that heights rounded to a step need; 0 for none.
+
+    Rounding is noise of variance step^2/12 a cell. After a Gaussian of standard deviation s
+    it leaves an rms slope of step/sqrt(12) * cell / (s^2 sqrt(8 pi)) along each axis, and s
+    brings that to 1 %. Where s is below half a cell the spline needs none.
+    """
+    noise = step / math.sqrt(12.0)
+    scale = math.sqrt(noise * cell / (SLOPE_ERROR * math.sqrt(8.0 * math.pi)))
+    return scale if scale >= 0.5 * cell else 0.0
 
 
 def check_scale(smoothing: float | None, bounds: Bounds) -> float:
@@ -54,22 +122,30 @@ def check_scale(smoothing: float | None, bounds: Bounds) -> float:
     return float(smoothing)
 
 
-def _smooth_axis(values: Array, scale: float, axis: int) -> Array:
-    """Smooth along one axis; scale in samples.
+def _smooth_lines(f: Array, scale: float) -> Array:
+    """Lines f (..., count) smoothed along the last axis; scale in samples.
 
     The line from the first sample to the last is taken off, and what remains is a sum of
     sines, each damped as a Gaussian damps it. So the values are continued beyond both ends
     by odd reflection: f(end + t) = 2 f(end) - f(end - t). Any scale is exact, also one below
     the spacing.
     """
-    f = np.moveaxis(values, axis, -1)
     count = f.shape[-1]
     line = f[..., :1] + (f[..., -1:] - f[..., :1]) * np.linspace(0.0, 1.0, count)
     frequencies = np.pi * np.arange(1, count - 1) / (count - 1)
     damping = np.exp(-0.5 * (scale * frequencies) ** 2)
     smoothed = line.copy()
     smoothed[..., 1:-1] += idst(damping * dst((f - line)[..., 1:-1], type=1), type=1)
-    return np.moveaxis(smoothed, -1, axis)
+    return smoothed
+
+
+def smooth_in_place(values: Array, dx: float, dy: float, scale: float) -> None:
+    """``smooth`` in the place of the values (layers, ny, nx), block by block."""
+    for layer in values:
+        for rows in blocks(*layer.shape):
+            layer[rows] = _smooth_lines(layer[rows], scale / dx)
+        for columns in blocks(layer.shape[1], layer.shape[0]):
+            layer[:, columns] = _smooth_lines(layer[:, columns].T, scale / dy).T
 
 
 def smooth(values: Array, dx: float, dy: float, scale: float) -> Array:
@@ -79,4 +155,6 @@ def smooth(values: Array, dx: float, dy: float, scale: float) -> Array:
     values are continued by odd reflection, so a plane stays a plane up to the edge, and the
     edge itself is smoothed only along itself.
     """
-    return np.ascontiguousarray(_smooth_axis(_smooth_axis(values, scale / dx, 2), scale / dy, 1))
+    smoothed = np.array(values, dtype=np.float64, order="C")
+    smooth_in_place(smoothed, dx, dy, scale)
+    return smoothed

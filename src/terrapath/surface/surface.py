@@ -26,7 +26,7 @@ from .costs import limited, require_costs, with_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
 from .mask import Mask
-from .smoothing import FEATURES_PER_SCALE, Smoothing, check_scale
+from .smoothing import FEATURES_PER_SCALE, Smoothing, blocks, check_scale
 
 Kind = Literal["rise", "cost"]
 
@@ -79,6 +79,17 @@ class Fit:
 STEEPEST = 1e12
 
 
+def _steepest_of(coefficients: Array, dx: float, dy: float) -> float:
+    """A bound of the slope of one spline layer, block by block."""
+    steepest = 0.0
+    for rows in blocks(*coefficients.shape):
+        block = coefficients[rows.start : rows.stop + 1]
+        along_x = np.abs(np.diff(block, axis=1)).max() / dx
+        along_y = np.abs(np.diff(block, axis=0)).max(initial=0.0) / dy
+        steepest = max(steepest, float(along_x), float(along_y))
+    return steepest
+
+
 def _steepest(data: Peaks | Spline) -> float:
     """A bound of the weighted slope of every layer, layer units/map unit."""
     with np.errstate(over="ignore"):
@@ -87,10 +98,8 @@ def _steepest(data: Peaks | Spline) -> float:
             weights = np.repeat(data.weights, np.diff(data.first))
             slopes = weights * amplitude * np.sqrt(2.0 * falloff / math.e)
             return float(slopes.max(initial=0.0))
-        weights = data.weights[:, None, None]
-        along_x = np.abs(np.diff(weights * data.coefficients, axis=2)).max() / data.dx
-        along_y = np.abs(np.diff(weights * data.coefficients, axis=1)).max() / data.dy
-        return float(max(along_x, along_y))
+        slopes = [_steepest_of(layer, data.dx, data.dy) for layer in data.coefficients]
+        return float((data.weights * slopes).max())
 
 
 EXACT = Fit("exact Gaussian peaks", 0.0, 0.0)

@@ -1,0 +1,45 @@
+"""``terrapath init``: a commented scenario file to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from .exit_codes import ExitCode
+
+
+def init_command(
+    where: Annotated[
+        str,
+        typer.Argument(metavar="MAP", help="A raster, or a built-in scene."),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The scenario file, .toml [default: named as the map]."),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Take the place of a file that exists.")
+    ] = False,
+) -> int:
+    """Write a scenario of a map: every key with its help, and a route that can be planned.
+
+    Exit codes: 0 written, 2 bad input.
+    """
+    from ..files import require_writable, written_whole
+    from ..io.scenario_template import scenario_of_map, scenario_of_scene
+    from ..scenes import SCENES
+    from .outputs import require_ending
+
+    file = output or Path(f"{where if where in SCENES else Path(where).stem}.toml")
+    require_ending(file, "output", ".toml")
+    require_writable(file)
+    if file.exists() and not force:
+        raise InputError(f"{file} exists; name another by --output, or give --force to replace it")
+    text = scenario_of_scene(where) if where in SCENES else scenario_of_map(Path(where), file)
+    with written_whole(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    typer.echo(f"{file} is written; plan it by: terrapath plan {file}")
+    return ExitCode.SOLVED

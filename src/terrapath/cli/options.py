@@ -1,0 +1,194 @@
+"""The command line's options, made of the declarations that scenario files share."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..errors import InputError
+from ..options import (
+    Declared,
+    Files,
+    LayerTable,
+    LayerTables,
+    Point,
+    Points,
+    Rectangle,
+    Smoothing,
+    Weights,
+    options,
+)
+
+Where = Annotated[
+    str,
+    typer.Argument(
+        metavar="WHERE",
+        help="A built-in scene (see `terrapath scenes`), a raster, or a scenario file (.toml).",
+    ),
+]
+
+
+def _numbers(text: str, name: str, form: str, what: str) -> tuple[float, ...]:
+    """As many numbers as the form has, with commas between."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+        if len(numbers) != form.count(",") + 1:
+            raise ValueError
+    except ValueError:
+        raise InputError(
+            f"{name}={text!r} is not {what}; write it as {form}, with a comma between numbers"
+        ) from None
+    return numbers
+
+
+def parse_point(text: str, name: str) -> Any:
+    """X,Y."""
+    return _numbers(text, name, "X,Y", "a point")
+
+
+def _parse_pairs(texts: Iterable[str], option: str, form: str) -> dict[str, str]:
+    """NAME=VALUE, each name once."""
+    pairs: dict[str, str] = {}
+    for text in texts:
+        name, separator, value = (part.strip() for part in text.partition("="))
+        if not (separator and name and value):
+            raise InputError(f"{option} {text!r} is not of the form {form}")
+        if name in pairs:
+            raise InputError(f"{option} gives the name {name!r} twice; give each its own name")
+        pairs[name] = value
+    return pairs
+
+
+def _parse_layers(texts: list[str], option: str, form: str) -> LayerTables:
+    from ..io import LayerSource
+
+    sources = {
+        name: LayerSource.parse(value) for name, value in _parse_pairs(texts, option, form).items()
+    }
+    return {
+        name: LayerTable(file=str(source.path), band=int(source.band), weight=source.weight)
+        for name, source in sources.items()
+    }
+
+
+def _parse_weights(texts: list[str], option: str, form: str) -> Weights:
+    weights = {}
+    for name, value in _parse_pairs(texts, option, form).items():
+        try:
+            weights[name] = float(value)
+        except ValueError:
+            raise InputError(f"{option} {name}={value}: {value!r} is not a number") from None
+    return weights
+
+
+def _parse_smoothing(text: str) -> Smoothing:
+    words: dict[str, Smoothing] = {"auto": "auto", "none": "none"}
+    if text in words:
+        return words[text]
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--smooth {text!r} is not a length; give metres, auto or none") from None
+
+
+def _is_flag(declaration: Declared) -> bool:
+    return declaration.type in (bool, bool | None)
+
+
+def _typed_by(declaration: Declared) -> Any:
+    """The type that typer reads on the command line; what it cannot read stays text."""
+    several = (Points, Point | Points, Files, LayerTables, Weights)
+    if declaration.type in several:
+        return list[str] | None
+    for kind in (int, float, bool):
+        if declaration.type in (kind, kind | None):
+            return kind | None
+    return str | None
+
+
+def _value(declaration: Declared, given: Any) -> Any:
+    """What was given on the command line as a scenario file's value."""
+    kind, flag, form = declaration.type, declaration.flags[0], declaration.option.form or ""
+    name = declaration.key
+    readers: list[tuple[Any, Callable[[Any], Any]]] = [
+        (Point | None, lambda text: parse_point(text, name)),
+        (Points, lambda texts: tuple(parse_point(text, name) for text in texts)),
+        (Point | Points, lambda texts: tuple(parse_point(text, name) for text in texts)),
+        (Rectangle | None, lambda text: _numbers(text, name, form, "a rectangle")),
+        (LayerTables, lambda texts: _parse_layers(texts, flag, form)),
+        (Weights, lambda texts: _parse_weights(texts, flag, form)),
+        (Smoothing, _parse_smoothing),
+        (int | str | None, lambda text: int(text) if text.isdecimal() else text),
+        (Files, tuple),
+    ]
+    for known, read in readers:
+        if kind == known:
+            return read(given)
+    return given
+
+
+def _parameter(declaration: Declared) -> inspect.Parameter:
+    option = declaration.option
+    metavar = None if _is_flag(declaration) else option.form
+    spoken = typer.Option(*declaration.flags, metavar=metavar, help=option.help, show_default=False)
+    return inspect.Parameter(
+        declaration.parameter,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=None,
+        annotation=Annotated[_typed_by(declaration), spoken],
+    )
+
+
+def _taken(sections: Iterable[str], also: Iterable[str], without: Iterable[str]) -> list[Declared]:
+    """The options of the sections that the command line has, and some by their parameter names."""
+    named, left_out = set(also), set(without)
+    return [
+        declaration
+        for declaration in options()
+        if declaration.flags
+        and (declaration.section in sections or declaration.parameter in named)
+        and declaration.parameter not in left_out
+    ]
+
+
+def with_options(
+    *sections: str, also: Iterable[str] = (), without: Iterable[str] = ()
+) -> Callable[[Callable[..., int]], Callable[..., int]]:
+    """A command that takes the options of these sections, for typer to see.
+
+    The command is called with ``given``, what stood on the command line, by section and key.
+    also, without : further and unwanted options by their parameter names, as planner_spacing.
+    """
+    taken = _taken(sections, also, without)
+
+    def decorate(command: Callable[..., int]) -> Callable[..., int]:
+        def read(**values: Any) -> int:
+            found = [(declaration, values.pop(declaration.parameter)) for declaration in taken]
+            return command(given=_by_section(found), **values)
+
+        own = inspect.signature(command, eval_str=True).parameters.values()
+        kept = [p.replace(kind=p.KEYWORD_ONLY) for p in own if p.name != "given"]
+        parameters = [*kept, *map(_parameter, taken)]
+        read.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        read.__annotations__ = {p.name: p.annotation for p in parameters}
+        read.__doc__, read.__name__ = command.__doc__, command.__name__
+        return read
+
+    return decorate
+
+
+def _by_section(found: Iterable[tuple[Declared, Any]]) -> dict[str, dict[str, Any]]:
+    given: dict[str, dict[str, Any]] = {}
+    for declaration, value in found:
+        if value is not None and value != []:
+            given.setdefault(declaration.section, {})[declaration.key] = _value(declaration, value)
+    return given
+
+
+def is_scenario(where: str) -> bool:
+    """Does the command's WHERE name a scenario file?"""
+    return Path(where).suffix.lower() == ".toml"

@@ -1,0 +1,157 @@
+"""One band of a map, wherever it comes from, read by rows: in part, or coarser."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import MapError
+from ..surface.grid import Grid
+from ..surface.smoothing import BLOCK
+from ..validation import Array, Bounds
+
+MARGIN = 8  # cells around a window: what lies beyond moves the spline by 1e-4 of itself
+SAMPLED_STRIPS = 8
+SAMPLED_ROWS = 16
+LEAST_SHARE = 0.5  # of a coarse cell that must have data
+
+
+@dataclass(frozen=True, eq=False)
+class Band(ABC):
+    """A band: its grid, and how to read it.
+
+    label : for messages. unit : "" where unknown. step : what its numbers are rounded to,
+    where its type tells; 0 otherwise.
+    """
+
+    grid: Grid
+    label: str
+    unit: str
+    step: float
+
+    @abstractmethod
+    def read(self, rows: slice, columns: slice) -> Array:
+        """Values (rows, columns) with scale and offset applied, NaN where there is no data."""
+
+    @property
+    def rows_at_once(self) -> int:
+        """How many rows lie together in the file."""
+        return 1
+
+
+@dataclass(frozen=True)
+class View:
+    """A part of a band, perhaps coarser."""
+
+    band: Band
+    rows: slice
+    columns: slice
+    factor: int = 1
+
+    @classmethod
+    def whole(cls, band: Band) -> View:
+        """All of it."""
+        return cls(band, slice(0, band.grid.rows), slice(0, band.grid.columns))
+
+    @property
+    def grid(self) -> Grid:
+        """The cells that are seen."""
+        window = self.band.grid.window(self.rows, self.columns)
+        return window if self.factor == 1 else window.coarser(self.factor)
+
+    def coarser(self, factor: int) -> View:
+        """The same part with cells ``factor`` times as large a side."""
+        return replace(self, factor=factor)
+
+    def around(self, x: Array, y: Array) -> View | None:
+        """The part that holds points in the band's own coordinates; None where there is none."""
+        column, row = self.band.grid.cells(x, y)
+        kept = []
+        for found, count in ((row, self.band.grid.rows), (column, self.band.grid.columns)):
+            first = max(0, math.floor(found.min() - MARGIN * self.factor))
+            last = min(count, math.ceil(found.max() + MARGIN * self.factor) + 1)
+            if first >= last or found.max() < -0.5 or found.min() > count - 0.5:
+                return None
+            kept.append(slice(first, last))
+        return replace(self, rows=kept[0], columns=kept[1])
+
+    def within(self, bounds: Bounds) -> View:
+        """The part inside a rectangle of the map's own coordinates, and a few cells more."""
+        x = np.array([bounds.x1_min, bounds.x1_max] * 2)
+        y = np.repeat([bounds.x2_min, bounds.x2_max], 2)
+        found = self.around(x, y)
+        if found is None:
+            extent = ", ".join(f"{value:.10g}" for value in self.band.grid.extent())
+            raise MapError(
+                f"within={tuple(bounds)} does not touch {self.band.label}, which covers ({extent}) "
+                "as (x_min, y_min, x_max, y_max); check the order and the CRS"
+            )
+        return found
+
+    def require_size(self, most_cells: int) -> None:
+        """Raise MapError, before memory is taken, where too many cells are asked for."""
+        grid = self.grid
+        if min(grid.rows, grid.columns) < 1:
+            raise MapError(
+                f"decimate={self.factor} leaves {grid.columns} x {grid.rows} cells of "
+                f"{self.band.label}; lower it"
+            )
+        if grid.rows * grid.columns > most_cells:
+            factor = math.ceil(self.factor * math.sqrt(grid.rows * grid.columns / most_cells))
+            raise MapError(
+                f"{self.band.label} has {grid.columns:,} x {grid.rows:,} cells, more than "
+                f"{most_cells:,}; read a part of it with within=(x_min, y_min, x_max, y_max), or "
+                f"all of it coarser with decimate={factor}"
+            )
+
+    def _strips(self) -> Iterator[tuple[int, Array]]:
+        """Rows of values with the index of the first, whole coarse cells together."""
+        width = self.columns.stop - self.columns.start
+        unit = math.lcm(self.factor, self.band.rows_at_once)
+        if unit * width > 8 * BLOCK:
+            unit = self.factor
+        size = unit * max(1, BLOCK // (unit * width))
+        start = self.rows.start
+        while start < self.rows.stop:
+            stop = min(start + size - (start - self.rows.start) % size, self.rows.stop)
+            yield start - self.rows.start, self.band.read(slice(start, stop), self.columns)
+            start = stop
+
+    def sample(self) -> Array:
+        """Some rows of the band as it is, from all over the part."""
+        width = self.columns.stop - self.columns.start
+        count = self.rows.stop - self.rows.start
+        wanted = min(count, max(SAMPLED_ROWS, BLOCK // width))
+        starts = np.linspace(self.rows.start, self.rows.stop, SAMPLED_STRIPS + 1).astype(int)[:-1]
+        size = max(1, wanted // SAMPLED_STRIPS)
+        return np.concatenate(
+            [
+                self.band.read(slice(start, min(start + size, self.rows.stop)), self.columns)
+                for start in np.unique(starts).tolist()
+            ]
+        )
+
+    def read_into(self, out: Array) -> None:
+        """Values of the grid's cells into ``out`` (rows, columns)."""
+        for start, strip in self._strips():
+            means = strip if self.factor == 1 else _block_means(strip, self.factor)
+            first = start // self.factor
+            out[first : first + len(means)] = means
+
+
+def _block_means(values: Array, factor: int) -> Array:
+    """Means over blocks of cells with data; NaN where over half of a block has none."""
+    rows, columns = (size // factor for size in values.shape)
+    cut = values[: rows * factor, : columns * factor]
+    cells = cut.reshape(rows, factor, columns, factor)
+    known = np.isfinite(cells).sum(axis=(1, 3))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of an empty block
+        means: Array = np.nanmean(cells, axis=(1, 3))
+    means[known < LEAST_SHARE * factor * factor] = np.nan
+    return means

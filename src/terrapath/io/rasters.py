@@ -1,0 +1,297 @@
+"""Bands of whatever GDAL reads."""
+
+from __future__ import annotations
+
+import logging
+import re
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from affine import Affine
+from pyproj import CRS
+
+from ..errors import MapError, TerrapathError
+from ..surface.georeference import parse_crs
+from ..surface.grid import Grid
+from ..validation import Array
+from .bands import Band
+
+CACHE_MEGABYTES = 128  # of GDAL's blocks; its own default is a twentieth of the memory
+MOST_BLOCK_BYTES = 2 * 2**30
+SECONDS_FOR_NETWORK = 30
+
+# What a variable of heights is called, the likeliest first.
+HEIGHT_NAMES = (
+    "height", "heights", "elevation", "elev", "dem", "dtm", "altitude", "orog", "topo",
+    "topography", "surface_altitude", "band1", "z",
+)  # fmt: skip
+
+
+@contextmanager
+def gdal() -> Iterator[None]:
+    """GDAL with a small cache, and silent: what matters comes back as an error."""
+    import rasterio
+
+    # Python prints warnings of loggers that nobody listens to.
+    logging.getLogger("rasterio").addHandler(logging.NullHandler())
+    with (
+        warnings.catch_warnings(),
+        _without_broken_messages(),
+        rasterio.Env(GDAL_CACHEMAX=CACHE_MEGABYTES, GDAL_HTTP_TIMEOUT=SECONDS_FOR_NETWORK),
+    ):
+        warnings.simplefilter("ignore")
+        yield
+
+
+@contextmanager
+def _without_broken_messages() -> Iterator[None]:
+    """Silence where a message of GDAL is no text: rasterio cannot log it, and prints that.
+
+    It does so by both hooks of the interpreter, from within a callback of GDAL.
+    """
+    uncaught, unraisable = sys.excepthook, sys.unraisablehook
+
+    def of_uncaught(kind: Any, error: Any, trace: Any) -> None:
+        if not issubclass(kind, UnicodeDecodeError):
+            uncaught(kind, error, trace)
+
+    def of_unraisable(what: Any) -> None:
+        if "rasterio" not in str(what.object):
+            unraisable(what)
+
+    sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable
+    try:
+        yield
+    finally:
+        sys.excepthook, sys.unraisablehook = uncaught, unraisable
+
+
+@contextmanager
+def reading(path: str | Path, *, is_file: bool = True) -> Iterator[None]:
+    """Turn what goes wrong inside into one line that names the file, or the array."""
+    try:
+        yield
+    except TerrapathError:
+        raise
+    except Exception as error:  # damaged files raise whatever GDAL, rasterio or NumPy do
+        raise _unreadable(path, error, is_file=is_file) from None
+
+
+def _unreadable(path: str | Path, error: Exception, *, is_file: bool) -> MapError:
+    # Asked only now: GDAL also reads names that are no paths, as in /vsizip/ or netcdf:.
+    if is_file and not _may_be_no_path(str(path)) and not _exists(path):
+        return MapError(f"{path} does not exist; check the path")
+    # Rasterio puts the reason into the cause: its own message only points there.
+    reason = " ".join(str(error.__cause__ or error).split()).rstrip(".") or type(error).__name__
+    return MapError(
+        f"{path} cannot be read as a raster: {reason:.300}; check that it is one, and whole"
+    )
+
+
+def _may_be_no_path(name: str) -> bool:
+    return name.startswith("/vsi") or re.match(r"[A-Za-z0-9_+]{2,}:", name) is not None
+
+
+def _exists(path: str | Path) -> bool:
+    try:
+        return Path(path).exists()
+    except (OSError, ValueError):
+        return False
+
+
+@dataclass(frozen=True, eq=False)
+class FileBand(Band):
+    """A band of an open dataset."""
+
+    dataset: Any
+    number: int
+    path: str | Path
+
+    @property
+    def rows_at_once(self) -> int:
+        """Rows of a block."""
+        return int(self.dataset.block_shapes[self.number - 1][0])
+
+    def read(self, rows: slice, columns: slice) -> Array:
+        """Values (rows, columns) with scale and offset applied, NaN where there is no data."""
+        from rasterio.windows import Window
+
+        size = rows.stop - rows.start, columns.stop - columns.start
+        window = Window(columns.start, rows.start, size[1], size[0])
+        with reading(self.path):
+            stored = self.dataset.read(self.number, window=window)
+            masked = self.dataset.read_masks(self.number, window=window) == 0
+            values: Array = stored.astype(np.float64)
+        scale = self.dataset.scales[self.number - 1]
+        offset = self.dataset.offsets[self.number - 1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            if (scale, offset) != (1.0, 0.0):
+                values *= scale
+                values += offset
+        values[masked | ~np.isfinite(values)] = np.nan
+        return values
+
+
+def open_band(
+    path: str | Path, number: int | str, files: Any, *, crs: CRS | None, heights: bool
+) -> FileBand:
+    """A band of a file, or of its subdataset; the dataset is closed with the stack ``files``.
+
+    number : the band, 1-based, or the name of a variable. crs : where the file has none.
+    """
+    with reading(path):
+        dataset = files.enter_context(_open(path))
+        if dataset.count == 0 or isinstance(number, str):
+            name, number = (number, 1) if isinstance(number, str) else (None, number)
+            dataset = files.enter_context(_open(_variable(path, dataset, name)))
+        _require_band(path, dataset, number)
+        _require_heights(path, dataset, number, heights)
+        kind = np.dtype(dataset.dtypes[number - 1])
+        return FileBand(
+            grid=_grid(path, dataset, crs),
+            label=str(path),
+            unit=_unit(dataset, number),
+            step=abs(dataset.scales[number - 1]) if kind.kind in "iu" else 0.0,
+            dataset=dataset,
+            number=number,
+            path=path,
+        )
+
+
+def classic_netcdf(path: str | Path) -> tuple[Path, str | None] | None:
+    """(file, variable or None) where a name is of a netCDF file of the classic format.
+
+    The netCDF library that GDAL reads those with crashes on damaged ones, and takes long.
+    """
+    match = re.fullmatch(r'(?i:netcdf):"?(.+?)"?(?::([^:"]+))?', str(path))
+    name, variable = (match[1], match[2]) if match else (str(path), None)
+    try:
+        with Path(name).open("rb") as file:
+            return (Path(name), variable) if file.read(3) == b"CDF" else None
+    except (OSError, ValueError):
+        return None
+
+
+def open_classic_netcdf(path: Path, files: Any) -> Any:
+    """The file as an xarray Dataset, read by SciPy; closed with the stack ``files``."""
+    import xarray
+
+    with reading(path):
+        return files.enter_context(
+            xarray.open_dataset(path, engine="scipy", decode_times=False, cache=False)
+        )
+
+
+def _open(path: str | Path) -> Any:
+    import rasterio
+
+    return rasterio.open(path)
+
+
+def _variable(path: str | Path, dataset: Any, name: str | None) -> str:
+    """The subdataset of a variable: the named one, the only one, or what heights are called."""
+    found = {
+        subdataset.rsplit(":", 1)[-1].strip('"/'): subdataset for subdataset in dataset.subdatasets
+    }
+    if name is not None and name in found:
+        return str(found[name])
+    if name is None and len(found) == 1:
+        return str(next(iter(found.values())))
+    likely = [key for key in HEIGHT_NAMES if key in found]
+    if name is None and likely:
+        return str(found[likely[0]])
+    if not found:
+        what = "holds no raster" if dataset.count == 0 else "has bands, no variables"
+        raise MapError(f"{path} {what}; name a band of it by its number")
+    asked = f"variable {name!r} is not in {path}" if name else f"{path} holds several variables"
+    raise MapError(f"{asked}; name one of: {', '.join(found)}")
+
+
+def _require_band(path: str | Path, dataset: Any, number: int) -> None:
+    if 1 <= number <= dataset.count:
+        return
+    described = enumerate(dataset.descriptions[:20], start=1)
+    listed = ", ".join(f"{k} {d or ''}".strip() for k, d in described)
+    more = ", ..." if dataset.count > 20 else ""
+    raise MapError(f"band={number} is not in {path}; its bands are: {listed}{more}")
+
+
+def _require_heights(path: str | Path, dataset: Any, number: int, heights: bool) -> None:
+    """Numbers of one real kind, no picture, in blocks that fit into memory."""
+    from rasterio.enums import ColorInterp
+
+    kind = np.dtype(dataset.dtypes[number - 1])
+    if kind.kind not in "iuf":
+        raise MapError(f"band {number} of {path} holds {kind} values; real numbers are needed")
+    colours = {ColorInterp.red, ColorInterp.green, ColorInterp.blue, ColorInterp.palette}
+    if heights and kind.itemsize == 1 and dataset.colorinterp[number - 1] in colours:
+        raise MapError(
+            f"band {number} of {path} is a colour of a picture "
+            f"({dataset.colorinterp[number - 1].name}), not heights; give the elevation model"
+        )
+    rows, columns = dataset.block_shapes[number - 1]
+    if int(rows) * int(columns) * kind.itemsize > MOST_BLOCK_BYTES:
+        raise MapError(
+            f"{path} lies in blocks of {columns:,} x {rows:,} cells, too large to read; rewrite it "
+            "in tiles first"
+        )
+
+
+def _unit(dataset: Any, number: int) -> str:
+    """The unit that the band names, else that of the vertical axis of its CRS."""
+    unit = dataset.units[number - 1]
+    if unit or dataset.crs is None:
+        return unit or ""
+    try:
+        full = CRS.from_user_input(dataset.crs)
+    except Exception:  # what is wrong with it is said where the grid is made
+        return ""
+    return str(full.axis_info[2].unit_name) if len(full.axis_info) > 2 else ""
+
+
+def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
+    """Where the cells lie; a file that does not say has cells of side 1, north up."""
+    found = parse_crs(dataset.crs, f"the CRS of {path}")
+    transform = dataset.transform
+    if transform.is_identity:
+        _require_place_may_lack(path, dataset)
+        transform = Affine(1.0, 0.0, 0.0, 0.0, -1.0, float(dataset.height))
+    determinant = transform.a * transform.e - transform.b * transform.d
+    if not (np.isfinite(list(transform)).all() and determinant != 0.0):
+        raise MapError(
+            f"{path} has the geotransform {tuple(transform)[:6]}, which is none; check the file"
+        )
+    return Grid(dataset.height, dataset.width, transform, with_crs(found, crs, path))
+
+
+def _require_place_may_lack(path: str | Path, dataset: Any) -> None:
+    """Raise MapError where a place is described, but not one that GDAL makes a grid of."""
+    if dataset.gcps[0] or dataset.rpcs:
+        raise MapError(
+            f"{path} is placed by ground control points or camera coefficients only; bring it "
+            "onto a grid first (gdalwarp)"
+        )
+    if dataset.driver in {"netCDF", "HDF5", "HDF5Image"}:
+        raise MapError(
+            f"GDAL does not find in {path} where its cells lie: the coordinates lack a "
+            "standard_name or units, or do not go in equal steps; open it with "
+            "xarray.open_dataset and give that"
+        )
+
+
+def with_crs(found: CRS | None, given: CRS | None, label: object) -> CRS | None:
+    """The CRS that a map has, or the one that is given for it; they must not contradict."""
+    if found is None or given is None:
+        return found or given
+    if not found.equals(given, ignore_axis_order=True):
+        raise MapError(
+            f"crs={given.name} contradicts {label}, which is in {found.name}; leave it out, or "
+            "bring the map into that CRS first"
+        )
+    return found

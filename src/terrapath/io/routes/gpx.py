@@ -1,0 +1,76 @@
+"""GPX: a track with elevations, for receivers and outdoor maps. Earth only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...errors import MapError
+from ...problem import Solution
+from ...surface import Surface
+from ...surface.georeference import Georeference
+from ...validation import Array
+from .places import DECIMALS, in_degrees
+from .profile import clean
+from .record import via_points
+from .units import height_metres
+
+
+def require_earth(path: Path, georeference: Georeference | None) -> None:
+    """Raise MapError where there is no WGS 84, which is all that GPX knows."""
+    if georeference is not None and georeference.is_earth:
+        return
+    where = "the map has no CRS" if georeference is None else f"{georeference.name} is not on Earth"
+    raise MapError(
+        f"output={str(path)!r} cannot be written: GPX holds places on Earth, and {where}; "
+        "write .geojson, .gpkg or .csv instead"
+    )
+
+
+def _places(surface: Surface, points: Array) -> list[dict[str, Any]]:
+    """Degrees, and metres as GPX asks; no elevation where the unit of heights is not known."""
+    reference, metres = surface.georeference, height_metres(surface)
+    assert reference is not None
+    degrees = np.round(in_degrees(reference, points), DECIMALS).tolist()
+    heights = surface.values(points)[:, 0].tolist()
+    return [
+        {
+            "longitude": longitude,
+            "latitude": latitude,
+            "elevation": None if metres is None else round(metres * height, 4),
+        }
+        for (longitude, latitude), height in zip(degrees, heights, strict=True)
+    ]
+
+
+def _description(solution: Solution) -> str:
+    surface = solution.problem.surface
+    text = f"length {solution.length:.6g} {surface.unit}".rstrip()
+    if solution.lower_bound is not None and solution.gap is not None:
+        text += f", no path is shorter than {solution.lower_bound:.6g}, gap {solution.gap:.3%}"
+    if height_metres(surface) is None:
+        text += "; without elevations: the unit of the heights is not known"
+    return f"{text}; {solution.planner}, seed {solution.seed}"
+
+
+def write(solution: Solution, file: Path) -> None:
+    """The profile as one track; start, via points and goal as waypoints."""
+    from gpxpy import gpx
+
+    assert solution.path is not None
+    problem, surface, via = solution.problem, solution.problem.surface, via_points(solution)
+    document = gpx.GPX()
+    document.creator = f"terrapath {__version__}"
+    names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
+    stops = _places(surface, np.concatenate([[problem.start], via, [problem.goal]]))
+    document.waypoints = [
+        gpx.GPXWaypoint(name=name, **place) for name, place in zip(names, stops, strict=True)
+    ]
+    track = gpx.GPXTrack(name=clean(problem.name) or "route", description=_description(solution))
+    points = _places(surface, solution.path.profile.points)
+    track.segments.append(gpx.GPXTrackSegment([gpx.GPXTrackPoint(**place) for place in points]))
+    document.tracks.append(track)
+    file.write_text(document.to_xml(), encoding="utf-8")

@@ -1,0 +1,102 @@
+"""What a traveller meets along a route, column by column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...problem import Path, Solution
+from ...validation import Array
+from .places import in_degrees
+from .units import height_scale
+
+
+class Column(NamedTuple):
+    """One quantity at each point of the profile."""
+
+    name: str
+    unit: str
+    values: Array  # (m,)
+
+    @property
+    def heading(self) -> str:
+        """Name and unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def headings(points: Array) -> Array:
+    """(m, 2): the unit vector towards the next point; where one stands still, as before."""
+    steps = np.diff(points, axis=0)
+    lengths = np.hypot(*steps.T)
+    moving = np.flatnonzero(lengths > 0.0)
+    if len(moving) == 0:
+        return np.tile([1.0, 0.0], (len(points), 1))
+    units = steps[moving] / lengths[moving, None]
+    before = np.searchsorted(moving, np.arange(len(points)), side="right") - 1
+    return np.asarray(units[np.maximum(before, 0)])
+
+
+class Slopes(NamedTuple):
+    """Slopes of the first layer at the points of a profile, degrees."""
+
+    along: Array  # (m,) in the direction of travel, positive uphill
+    ground: Array  # (m,) of the ground, the steepest way
+
+
+def slopes(path: Path) -> Slopes:
+    """Slopes along a path; height and plane are alike where a unit is not known."""
+    points = path.profile.points
+    gradients = height_scale(path.surface) * path.surface.gradients(points)[:, 0]
+    along = (gradients * headings(points)).sum(axis=1)
+    return Slopes(*np.degrees(np.arctan([along, np.hypot(*gradients.T)])))
+
+
+def profile_columns(solution: Solution) -> list[Column]:
+    """Distance, place, height, slopes and every further layer."""
+    path, surface = solution.path, solution.problem.surface
+    assert path is not None
+    profile, found = path.profile, slopes(path)
+    columns = [
+        Column("distance", "", profile.distance),
+        Column("x", "", profile.points[:, 0]),
+        Column("y", "", profile.points[:, 1]),
+    ]
+    if surface.georeference is not None:
+        longitude, latitude = in_degrees(surface.georeference, profile.points).T
+        columns += [Column("longitude", "", longitude), Column("latitude", "", latitude)]
+    height = Column(surface.layers[0].name, surface.layers[0].unit, profile.values[:, 0])
+    slope = [
+        Column("slope", "degrees", found.along),
+        Column("ground slope", "degrees", found.ground),
+    ]
+    return [*columns, height, *slope, *further_layers(path)]
+
+
+def further_layers(path: Path) -> list[Column]:
+    """All layers along the profile but the height: those whose changes cost, then the costs."""
+    surface: Any = path.surface
+    profile: Any = path.profile
+    costs = getattr(surface, "costs", ())
+    values = [*profile.values.T[1:], *(profile.costs.T if costs else ())]
+    layers = [*surface.layers[1:], *costs]
+    return [Column(a.name, a.unit, v) for a, v in zip(layers, values, strict=True)]
+
+
+def clean(text: str) -> str:
+    """On one line, and without letters that no file or screen can show."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def distinct(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:
+    """Clean names, numbered where two are alike but for their case."""
+    found: list[str] = []
+    used = {name.casefold() for name in taken}
+    for name in map(clean, names):
+        candidate, k = name or "layer", 2
+        while candidate.casefold() in used:
+            candidate, k = f"{name} ({k})", k + 1
+        used.add(candidate.casefold())
+        found.append(candidate)
+    return found

@@ -1,0 +1,129 @@
+"""Solutions as records, ready for JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...problem import Solution
+from ...validation import Array
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON knows it: it has no infinity, no NaN and no arrays."""
+    if isinstance(value, dict):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+
+
+def dump(record: Any, indent: int | None = None) -> str:
+    """Strict JSON; letters that no encoding can hold stay escaped."""
+    return json.dumps(plain(record), allow_nan=False, indent=indent) + "\n"
+
+
+def via_points(solution: Solution) -> Array:
+    """(k, 2): where one leg ends and the next begins, map units; empty for a single leg."""
+    ends = [leg.problem.goal for leg in solution.legs[:-1] if solution.path is not None]
+    return np.array(ends, np.float64).reshape(-1, 2)
+
+
+def provenance(solution: Solution) -> dict[str, Any]:
+    """What the route was made by and from. No dates: the same seed gives the same bytes."""
+    surface = solution.problem.surface
+    found: dict[str, Any] = {
+        "software": f"terrapath {__version__}",
+        "planner": solution.planner,
+        "samples": solution.samples,
+        "seed": solution.seed,
+        "layers": {layer.name: layer.weight for layer in surface.layers},
+    }
+    known = {
+        "costs": {layer.name: layer.weight for layer in getattr(surface, "costs", ())},
+        "options": getattr(solution, "options", None),
+        "map": getattr(surface, "source", None),
+    }
+    found |= {key: value for key, value in known.items() if value}
+    if surface.georeference is not None:
+        found["planned_in"] = surface.georeference.crs.to_string()
+    return found
+
+
+def _ends_in_degrees(solution: Solution) -> dict[str, Any]:
+    """The plane's CRS, and what there is in longitude and latitude."""
+    reference = solution.problem.surface.georeference
+    if reference is None:
+        return {}
+    problem, path = solution.problem, solution.path
+    ends = reference.to_lonlat(np.array([problem.start, problem.goal]))
+    return {
+        "crs": reference.crs.to_string(),
+        "start_lonlat": ends[0],
+        "goal_lonlat": ends[1],
+        "path_lonlat": None if path is None else reference.to_lonlat(path.points),
+    }
+
+
+def _measures(solution: Solution) -> dict[str, Any]:
+    """How it ended, how long the route is, and how good."""
+    path = solution.path
+    return {
+        "status": solution.status.value,
+        "length": solution.length,
+        "unrefined_length": None if solution.unrefined is None else solution.unrefined.length,
+        "cost": solution.cost,
+        "lower_bound": solution.lower_bound,
+        "gap": solution.gap,
+        "climb": None if path is None else path.climb,
+        "straight_length": solution.problem.straight_length,
+        "contributions": getattr(path, "contributions", None),
+        "unit": solution.problem.surface.unit,
+    }
+
+
+def route_record(solution: Solution) -> dict[str, Any]:
+    """All that is known of a solution, ready for JSON.
+
+    ``start``, ``goal``, ``via`` and ``path`` are on the plane that was planned in, map units;
+    with a georeference ``crs`` names that plane, and ``start_lonlat``, ``goal_lonlat`` and
+    ``path_lonlat`` are longitude and latitude in degrees. ``unrefined_length`` is of the
+    planner's own path where that was refined. ``contributions`` are the shares of the length
+    that the plane and each layer make up.
+    """
+    problem, path = solution.problem, solution.path
+    record: dict[str, Any] = {
+        **_measures(solution),
+        "seconds": solution.seconds,
+        "start": problem.start,
+        "goal": problem.goal,
+        "via": via_points(solution),
+        "path": None if path is None else path.points,
+        "stopped_by": solution.stopped_by,
+        "counters": solution.counters,
+        "alternatives": [other.length for other in solution.alternatives],
+        **provenance(solution),
+        **_ends_in_degrees(solution),
+    }
+    return dict(plain(record))
+
+
+def summary(solution: Solution) -> dict[str, Any]:
+    """What is known of a route but its points: measures and provenance."""
+    return dict(plain({**_measures(solution), **provenance(solution)}))
+
+
+def write_json(solution: Solution, file: Path) -> None:
+    """The record."""
+    file.write_text(dump(route_record(solution)), encoding="utf-8")

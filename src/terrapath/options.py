@@ -1,0 +1,558 @@
+"""Every option of ``terrapath plan``: name, type, default and help, each said once.
+
+The command line, scenario files, their JSON Schema and what ``terrapath init`` writes are all
+made of these declarations. Nothing heavy is imported here: typer reads them to print the
+help, pydantic only where a file is read.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias, get_type_hints
+
+Point: TypeAlias = tuple[float, float]
+Points: TypeAlias = tuple[Point, ...]
+Rectangle: TypeAlias = tuple[float, float, float, float]
+Files: TypeAlias = tuple[str, ...]
+Smoothing: TypeAlias = float | Literal["auto", "none"]
+
+# How pydantic reads a section: unknown keys are errors, and so are NaN and infinity.
+STRICT: dict[str, Any] = {"extra": "forbid", "allow_inf_nan": False}
+
+
+@dataclass(frozen=True)
+class Option:
+    """What is said of an option beside its name, type and default.
+
+    expects : what a scenario file has to give, in words. form : what stands for the value on
+    the command line. flags : there, where they are not made of the key. example : as TOML,
+    for an option without a default. is_file : the text names a file.
+    """
+
+    help: str
+    expects: str
+    form: str | None = None
+    flags: tuple[str, ...] = ()
+    example: str = ""
+    is_file: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        schema = handler(source)
+        _forbid_conversion(schema)
+        return schema
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> Any:
+        return handler(schema) | {"description": self.help}
+
+
+def _forbid_conversion(schema: Any) -> None:
+    """No number from text, no whole number from a fraction, no number from true."""
+    if isinstance(schema, dict):
+        if schema.get("type") in {"float", "int", "bool", "str"}:
+            schema["strict"] = True
+        for part in schema.values():
+            _forbid_conversion(part)
+    elif isinstance(schema, list | tuple):
+        for part in schema:
+            _forbid_conversion(part)
+
+
+NUMBER, WHOLE, SWITCH, TEXT = "a finite number", "a whole number", "true or false", "text"
+FILE, FILES = "the path of a file, as text", "a list of paths, each as text"
+A_POINT = "two finite numbers, [X, Y]"
+COUNT: Any = functools.partial(Option, expects=WHOLE, form="N")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayerTable:
+    """A band of a raster as a layer."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    file: Annotated[str, Option("The raster.", FILE, is_file=True)]
+    band: Annotated[int, Option("Its band, 1-based.", WHOLE)] = 1
+    weight: Annotated[
+        float,
+        Option(
+            "Of a layer: map units of way that a change of one unit counts for. Of a cost: the "
+            "exponent of the multiplier.",
+            NUMBER,
+        ),
+    ] = 1.0
+
+
+LayerTables: TypeAlias = dict[str, LayerTable]
+Weights: TypeAlias = dict[str, float]
+A_LAYER = "a table with file, band and weight"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapSection:
+    """The ground: a raster with its layers, or a built-in scene."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    path: Annotated[
+        str | None,
+        Option("A raster, anything GDAL reads.", FILE, is_file=True, example='"dem.tif"'),
+    ] = None
+    scene: Annotated[
+        str | None,
+        Option("A built-in scene, see `terrapath scenes`.", TEXT, example='"six-peaks"'),
+    ] = None
+    height_band: Annotated[
+        int | str | None,
+        Option(
+            "Band of the heights, its number or the name of a variable [default: 1].",
+            "a whole number, or the name of a variable as text",
+            form="BAND",
+            example="1",
+        ),
+    ] = None
+    fill_holes: Annotated[
+        float,
+        Option(
+            "Fill holes without data whose longer side is at most this, map units; larger ones "
+            "stay blocked [default: 0, none].",
+            NUMBER,
+            form="SIZE",
+        ),
+    ] = 0.0
+    smooth: Annotated[
+        Smoothing,
+        Option(
+            "Smooth over this length (standard deviation, map units); auto is the least that "
+            "heights rounded to a step need [default], none leaves the map as it is.",
+            'a finite number, "auto" or "none"',
+            form="METRES|auto|none",
+        ),
+    ] = "auto"
+    crs: Annotated[
+        str | None,
+        Option(
+            "CRS of a map that names none, as EPSG:32617.",
+            TEXT,
+            form="CRS",
+            example='"EPSG:32617"',
+        ),
+    ] = None
+    layers: Annotated[
+        LayerTables,
+        Option(
+            "A further layer, whose change costs; may be repeated.",
+            A_LAYER,
+            form="NAME=FILE[:BAND][*WEIGHT]",
+            flags=("--layer",),
+        ),
+    ] = field(default_factory=dict)
+    costs: Annotated[
+        LayerTables,
+        Option(
+            "A multiplier above 0 of the length, whose level costs; may be repeated.",
+            A_LAYER,
+            form="NAME=FILE[:BAND][*EXPONENT]",
+            flags=("--cost",),
+        ),
+    ] = field(default_factory=dict)
+    weights: Annotated[
+        Weights,
+        Option(
+            "Map units that a unit of a layer counts for, the height's too; may be repeated.",
+            "a table of numbers, NAME = WEIGHT",
+            form="NAME=WEIGHT",
+            flags=("--weight",),
+        ),
+    ] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteSection:
+    """From where to where."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    start: Annotated[
+        Point | None,
+        Option("Start, in the map's own coordinates.", A_POINT, form="X,Y", example="[0.0, 0.0]"),
+    ] = None
+    goal: Annotated[
+        Point | Points,
+        Option(
+            "Goal, in the map's own coordinates; of several the nearest by true length wins.",
+            "a point, [X, Y], or a list of points",
+            form="X,Y",
+            example="[10.0, 10.0]",
+        ),
+    ] = ()
+    all_goals: Annotated[
+        bool,
+        Option(
+            "Plan to each of several goals and report all, or only as far as is needed to know "
+            "the nearest [default].",
+            SWITCH,
+            flags=("--all-goals/--nearest-goal",),
+        ),
+    ] = False
+    via: Annotated[
+        Points,
+        Option(
+            "Pass here on the way; may be repeated, in order.",
+            "a list of points, [[X, Y], ...]",
+            form="X,Y",
+            example="[[5.0, 2.0]]",
+        ),
+    ] = ()
+    latlon: Annotated[
+        bool,
+        Option(
+            "Start, goal and via are latitude,longitude in degrees: WGS 84 on Earth, the body's "
+            "own elsewhere.",
+            SWITCH,
+            flags=("--latlon/--no-latlon",),
+        ),
+    ] = False
+    bounds: Annotated[
+        Rectangle | None,
+        Option(
+            "Plan within this rectangle, in the map's own coordinates [default: the whole map].",
+            "four finite numbers, [X1, Y1, X2, Y2]",
+            form="X1,Y1,X2,Y2",
+            example="[-1.0, -1.0, 11.0, 11.0]",
+        ),
+    ] = None
+
+    @property
+    def goals(self) -> Points:
+        """The goals, also where there is one."""
+        if self.goal and not isinstance(self.goal[0], tuple):
+            return (self.goal,)
+        return self.goal
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstraintsSection:
+    """Where the route may not go."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    obstacles: Annotated[
+        Files,
+        Option(
+            "A vector file of obstacles, in any CRS; may be repeated.",
+            FILES,
+            form="FILE",
+            is_file=True,
+            example='["obstacles.geojson"]',
+        ),
+    ] = ()
+    radius: Annotated[
+        float,
+        Option(
+            "Of the vehicle: the least distance to every obstacle, map units [default: 0].",
+            NUMBER,
+            form="R",
+        ),
+    ] = 0.0
+    max_slope: Annotated[
+        float | None,
+        Option(
+            "The steepest ground that may be entered, degrees.",
+            NUMBER,
+            form="DEGREES",
+            example="25.0",
+        ),
+    ] = None
+    keep_in: Annotated[
+        str | None,
+        Option(
+            "A vector file of the area that may not be left, in any CRS.",
+            FILE,
+            form="FILE",
+            is_file=True,
+            example='"area.geojson"',
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerSection:
+    """How the route is looked for, and what is proven of it."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    name: Annotated[
+        str,
+        Option(
+            "rrt-star-r, rrt-star (chord baseline), rrt, dijkstra, a-star, fast-marching, "
+            "geodesic-traversal or optimal.",
+            "the name of a planner, as text",
+            form="NAME",
+            flags=("--planner",),
+        ),
+    ] = "rrt-star-r"
+    refine: Annotated[
+        bool,
+        Option(
+            "Take the planner's path to the locally shortest one [default], or not.",
+            SWITCH,
+            flags=("--refine/--no-refine",),
+        ),
+    ] = True
+    bound: Annotated[
+        bool,
+        Option(
+            "Prove how short any path can be [default], or not.",
+            SWITCH,
+            flags=("--bound/--no-bound",),
+        ),
+    ] = True
+    target_gap: Annotated[
+        float | None,
+        Option(
+            "Refine the bound until (length - bound) / bound is G "
+            "[default: 0.001 with optimal, else the first bound will do].",
+            NUMBER,
+            form="G",
+            example="0.01",
+        ),
+    ] = None
+    routes: Annotated[
+        int | None, COUNT("Distinct routes that optimal looks for [default: 3].", example="3")
+    ] = None
+    samples: Annotated[int | None, COUNT("Samples to draw [default: 10000].", example="10000")] = (
+        None
+    )
+    step: Annotated[
+        float | None,
+        Option(
+            "Longest edge, map units [default: a twelfth of the region's side].",
+            NUMBER,
+            form="S",
+            example="1.0",
+        ),
+    ] = None
+    seed: Annotated[
+        int | None,
+        Option("The same seed, the same route [default: 0].", WHOLE, form="K", example="0"),
+    ] = None
+    spacing: Annotated[
+        float | None,
+        Option(
+            "Of the nodes of dijkstra, a-star, fast-marching, optimal and `terrapath field`, map "
+            "units [default: a 250th of the region's longer side, or a cell of a finer map].",
+            NUMBER,
+            form="D",
+            example="0.05",
+        ),
+    ] = None
+    neighbours: Annotated[
+        int | None,
+        COUNT("Of a node of dijkstra and a-star: 8, 16 or 32 [default: 16].", example="16"),
+    ] = None
+    directions: Annotated[
+        int | None, COUNT("Rays of geodesic-traversal [default: 600].", example="600")
+    ] = None
+    radius_factor: Annotated[
+        float | None,
+        Option(
+            "Times the least near radius of the theory [default: 1.5].",
+            NUMBER,
+            form="F",
+            example="1.5",
+        ),
+    ] = None
+    goal_bias: Annotated[
+        float | None,
+        Option(
+            "Share of samples that are the goal [default: 0.05].",
+            NUMBER,
+            form="P",
+            example="0.05",
+        ),
+    ] = None
+    informed: Annotated[
+        bool | None,
+        Option(
+            "Sample where better paths can be [default], or everywhere.",
+            SWITCH,
+            flags=("--informed/--uniform",),
+            example="true",
+        ),
+    ] = None
+    time_limit: Annotated[
+        float | None,
+        Option(
+            "Stop then, with the best so far; legs and goals share it.",
+            NUMBER,
+            form="SECONDS",
+            example="60.0",
+        ),
+    ] = None
+    target_length: Annotated[
+        float | None,
+        Option("Stop at a path this short, map units.", NUMBER, form="LENGTH", example="17.2"),
+    ] = None
+
+    @property
+    def own(self) -> dict[str, Any]:
+        """The options of the planner itself that were given."""
+        general = {"name", "refine", "bound", "target_gap"}
+        given = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return {k: v for k, v in given.items() if k not in general and v is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputSection:
+    """Where the answer goes."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    files: Annotated[
+        Files,
+        Option(
+            "Write the route, in the format of the ending; may be repeated.",
+            FILES,
+            form="FILE",
+            flags=("--output",),
+            is_file=True,
+            example='["route.geojson"]',
+        ),
+    ] = ()
+    plot: Annotated[
+        str | None,
+        Option(
+            "Draw the route on the map: .png, .svg, .pdf or .jpg.",
+            FILE,
+            form="FILE",
+            is_file=True,
+            example='"route.png"',
+        ),
+    ] = None
+    profile: Annotated[
+        str | None,
+        Option(
+            "Draw heights and slopes along the route: .png, .svg, .pdf or .jpg.",
+            FILE,
+            form="FILE",
+            is_file=True,
+            example='"profile.png"',
+        ),
+    ] = None
+    page: Annotated[
+        str | None,
+        Option(
+            "Write an interactive 3-D page of terrain and route, .html.",
+            FILE,
+            form="FILE.html",
+            is_file=True,
+            example='"route.html"',
+        ),
+    ] = None
+    certificate: Annotated[
+        str | None,
+        Option(
+            "Write the proof of the bound, .npz, for `terrapath check`; of several legs "
+            "numbered files.",
+            FILE,
+            form="FILE",
+            is_file=True,
+            example='"proof.npz"',
+        ),
+    ] = None
+    json: Annotated[
+        bool,
+        Option("Print one JSON object and nothing else.", SWITCH, flags=("--json/--no-json",)),
+    ] = False
+    quiet: Annotated[
+        bool, Option("No progress bar.", SWITCH, flags=("--quiet/--no-quiet", "-q"))
+    ] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """A question to Terrapath: all that ``terrapath plan`` can be told."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    map: MapSection = field(default_factory=MapSection)
+    route: RouteSection = field(default_factory=RouteSection)
+    constraints: ConstraintsSection = field(default_factory=ConstraintsSection)
+    planner: PlannerSection = field(default_factory=PlannerSection)
+    output: OutputSection = field(default_factory=OutputSection)
+
+    def files(self) -> Iterator[str]:
+        """All files that are named, to be read or written."""
+        for entry in options():
+            value = getattr(getattr(self, entry.section), entry.key)
+            if entry.option.is_file and value:
+                yield from [value] if isinstance(value, str) else value
+        for table in (*self.map.layers.values(), *self.map.costs.values()):
+            yield table.file
+
+    def overridden(self, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
+        """With the values given, by section and key; tables are merged name by name."""
+        changed = {}
+        for name, values in given.items():
+            section = getattr(self, name)
+            merged = {
+                key: {**getattr(section, key), **value} if isinstance(value, dict) else value
+                for key, value in values.items()
+            }
+            changed[name] = dataclasses.replace(section, **merged)
+        return dataclasses.replace(self, **changed)
+
+
+SECTIONS: Mapping[str, type] = {
+    "map": MapSection,
+    "route": RouteSection,
+    "constraints": ConstraintsSection,
+    "planner": PlannerSection,
+    "output": OutputSection,
+}
+
+
+class Declared(NamedTuple):
+    """An option with its place, as it was declared above."""
+
+    section: str
+    key: str
+    type: Any
+    default: Any
+    option: Option
+
+    @property
+    def parameter(self) -> str:
+        """Its name among the arguments of a command."""
+        return f"{self.section}_{self.key}"
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Its names on the command line; none where the command names it in another way."""
+        if self.key in {"path", "scene"}:
+            return ()
+        return self.option.flags or (f"--{self.key.replace('_', '-')}",)
+
+
+@functools.cache
+def declared(section: type) -> tuple[tuple[str, Any, Any, Option], ...]:
+    """Key, type, default and option of each field of a section, in order."""
+    hints = get_type_hints(section, include_extras=True)
+    return tuple(
+        (
+            entry.name,
+            hints[entry.name].__origin__,
+            entry.default if entry.default is not dataclasses.MISSING else {},
+            hints[entry.name].__metadata__[0],
+        )
+        for entry in dataclasses.fields(section)
+    )
+
+
+def options(*sections: str) -> Iterator[Declared]:
+    """The options of the sections, of all by default."""
+    for name in sections or SECTIONS:
+        for key, kind, default, option in declared(SECTIONS[name]):
+            yield Declared(name, key, kind, default, option)

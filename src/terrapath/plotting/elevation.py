@@ -1,0 +1,98 @@
+"""The chart of a route: height, slope and further layers against the distance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import FuncFormatter
+
+from ..io.routes.profile import Column, Slopes, further_layers, slopes
+from ..io.routes.record import via_points
+from ..problem import Path, Solution
+from ..validation import Array
+from .map_view import PATH_COLOUR
+from .terrain import with_unit
+
+HEIGHT_COLOUR, GROUND_COLOUR, LIMIT_COLOUR = "#6b5b3e", "#9a9a9a", "#8a2be2"
+LAYER_COLOUR = "#0b6e4f"
+# Heights of the panels, inches.
+HEIGHT_PANEL, SLOPE_PANEL, LAYER_PANEL, TITLE = 2.6, 1.8, 1.2, 0.9
+WIDTH = 10.0
+
+
+def _draw_height(axes: Any, path: Path) -> None:
+    profile, height = path.profile, path.surface.layers[0]
+    values = profile.values[:, 0]
+    axes.plot(profile.distance, values, color=HEIGHT_COLOUR, lw=1.6)
+    spread = float(np.ptp(values)) or 1.0
+    floor = float(values.min()) - 0.08 * spread
+    axes.fill_between(profile.distance, floor, values, color=HEIGHT_COLOUR, alpha=0.25, lw=0)
+    axes.set_ylim(floor, float(values.max()) + 0.08 * spread)
+    axes.set_ylabel(with_unit(height.name, height.unit))
+
+
+def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None) -> None:
+    """Along the path, signed, and the steepest of the ground, both ways of zero."""
+    band = {"color": GROUND_COLOUR, "alpha": 0.35, "lw": 0}
+    axes.fill_between(distance, -found.ground, found.ground, label="of the ground", **band)
+    axes.plot(distance, found.along, color=PATH_COLOUR, lw=1.0, label="along the route")
+    axes.axhline(0.0, color="black", lw=0.6)
+    if limit is not None:
+        style = {"color": LIMIT_COLOUR, "ls": "--", "lw": 1.2}
+        axes.axhline(limit, label=f"limit of the ground's slope, {limit:g} degrees", **style)
+        axes.axhline(-limit, **style)
+    axes.set_ylabel("slope (degrees)")
+    axes.legend(fontsize=8, loc="upper right", ncols=3, framealpha=0.85)
+    low, high = axes.get_ylim()
+    # Room for the limit's line below, and for the legend above.
+    axes.set_ylim(low - 0.04 * (high - low), high + 0.25 * (high - low))
+
+
+def _draw_layer(axes: Any, distance: Array, shown: Column) -> None:
+    axes.plot(distance, shown.values, color=LAYER_COLOUR, lw=1.2)
+    axes.set_ylabel(with_unit(shown.name, shown.unit, "\n"))
+
+
+def _mark_vias(axes: Any, solution: Solution, path: Path) -> None:
+    """Where a leg ends: dashed lines, numbered on the first panel."""
+    for k, via in enumerate(via_points(solution), start=1):
+        nearest = int(np.argmin(np.hypot(*(path.profile.points - via).T)))
+        distance = path.profile.distance[nearest]
+        for panel in axes:
+            panel.axvline(distance, color="black", ls=":", lw=1.0)
+        where = {"xycoords": axes[0].get_xaxis_transform(), "va": "top", "fontsize": 8}
+        axes[0].annotate(
+            f"via {k}", (distance, 0.98), xytext=(3, 0), textcoords="offset points", **where
+        )
+
+
+def draw_charts(figure: Any, solution: Solution, path: Path) -> None:
+    """Panels under each other with one axis of distance."""
+    problem, distance = solution.problem, path.profile.distance
+    more = further_layers(path)
+    ratios = [HEIGHT_PANEL, SLOPE_PANEL, *[LAYER_PANEL] * len(more)]
+    axes = figure.subplots(
+        len(ratios), sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios}
+    )[:, 0]
+    _draw_height(axes[0], path)
+    _draw_slopes(axes[1], distance, slopes(path), getattr(problem, "max_slope", None))
+    for panel, shown in zip(axes[2:], more, strict=True):
+        _draw_layer(panel, distance, shown)
+    _mark_vias(axes, solution, path)
+    unit = problem.surface.unit
+    kilometres = unit == "m" and distance[-1] >= 10_000.0
+    if kilometres:
+        axes[-1].xaxis.set_major_formatter(FuncFormatter(lambda at, _: f"{at / 1000.0:g}"))
+    unit_shown = f" ({'km' if kilometres else unit})" if unit else ""
+    axes[-1].set_xlabel(f"distance along the surface{unit_shown}")
+    axes[-1].set_xlim(0.0, distance[-1] or 1.0)
+    for panel in axes:
+        panel.grid(alpha=0.3)
+    figure.align_ylabels(axes)
+
+
+def chart_size(path: Path) -> tuple[float, float]:
+    """Width and height of the figure, inches."""
+    more = len(further_layers(path))
+    return WIDTH, TITLE + HEIGHT_PANEL + SLOPE_PANEL + more * LAYER_PANEL

@@ -1,0 +1,108 @@
+"""Values of one grid brought onto another, at exactly transformed coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from .._kernels.surfaces import Spline, fill_values
+from ..errors import MapError
+from ..validation import Array
+from .fitting import interpolate
+from .georeference import transformer
+from .grid import SAME_PLACE, Grid
+from .holes import continue_into_holes, missing_cells
+from .smoothing import blocks
+
+LEAST_FOR_SPLINE = 4  # cells a side
+
+
+def _spline_through(values: Array) -> Spline:
+    """The bicubic spline over (column, row), cells counted from the first centre."""
+    rows, columns = values.shape
+    x, y = np.arange(columns, dtype=np.float64), np.arange(rows, dtype=np.float64)
+    return interpolate(values[None], x, y, np.ones(1))
+
+
+def _spline_at(spline: Spline, column: Array, row: Array, shape: tuple[int, int]) -> Array:
+    """The spline at points; within half a cell of its edge continued by odd reflection."""
+    points = np.stack([column, row], axis=-1)
+    nearest = np.clip(points, 0.0, [shape[1] - 1.0, shape[0] - 1.0])
+    inside, mirrored = np.empty((len(points), 1)), np.empty((len(points), 1))
+    fill_values(spline, nearest, inside)
+    beyond = np.flatnonzero((nearest != points).any(axis=1))
+    fill_values(spline, 2.0 * nearest[beyond] - points[beyond], mirrored[: len(beyond)])
+    inside[beyond] = 2.0 * inside[beyond] - mirrored[: len(beyond)]
+    return inside[:, 0]
+
+
+def _source_cells(source: Grid, target: Grid, rows: slice) -> tuple[Array, Array]:
+    """Where the centres of some rows of the target lie in the source: (column, row)."""
+    column, row = np.meshgrid(
+        np.arange(target.columns) + 0.5, np.arange(rows.start, rows.stop) + 0.5
+    )
+    x, y = target.place(column.ravel(), row.ravel())
+    if source.crs is not None and target.crs is not None and source.crs != target.crs:
+        x, y = transformer(target.crs, source.crs).transform(x, y)
+        if source.crs.is_geographic:  # any longitude is also one 360 degrees on
+            west, _, east, _ = source.extent()
+            x = x + 360.0 * np.rint((0.5 * (west + east) - x) / 360.0)
+    return source.cells(x, y)
+
+
+def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: bool) -> None:
+    """Values (rows, columns) of a grid onto another one, into ``out``; NaN is no-data.
+
+    By a bicubic spline, or bilinear, which leaves the range of the values nowhere. Each cell
+    asks at its own centre, and is no-data where that lies in a cell without data or outside.
+    The values are changed: those without data get some.
+    """
+    missing = missing_cells(values)
+    if missing.all():
+        out[...] = np.nan
+        return
+    continue_into_holes(values, missing)
+    linear = linear or min(values.shape) < LEAST_FOR_SPLINE
+    spline = None if linear else _spline_through(values)
+    last = np.array(values.shape) - 1
+    for rows in blocks(target.rows, target.columns):
+        column, row = _source_cells(source, target, rows)
+        with np.errstate(invalid="ignore"):
+            inside = (np.abs(column - 0.5 * last[1]) <= 0.5 * last[1] + 0.5 + SAME_PLACE) & (
+                np.abs(row - 0.5 * last[0]) <= 0.5 * last[0] + 0.5 + SAME_PLACE
+            )
+        column, row = column[inside], row[inside]
+        nearest = [
+            np.clip(np.rint(c).astype(int), 0, m) for c, m in zip((row, column), last, strict=True)
+        ]
+        if spline is None:
+            found = map_coordinates(values, [row, column], order=1, mode="nearest")
+        else:
+            found = _spline_at(spline, column, row, (values.shape[0], values.shape[1]))
+        found[missing[nearest[0], nearest[1]]] = np.nan
+        block = np.full(inside.shape, np.nan)
+        block[inside] = found
+        out[rows] = block.reshape(-1, target.columns)
+
+
+def require_overlap(name: str, source: Grid, target: Grid) -> None:
+    """Raise MapError where a layer covers none of the map."""
+    x, y = target.outline(source.crs)
+    column, row = source.cells(x, y)
+    if source.crs is not None and source.crs.is_geographic:
+        turn = 360.0 / abs(source.transform.a)
+        column = column - turn * np.rint((column - 0.5 * source.columns) / turn)
+    overlaps = (
+        len(x) > 0
+        and column.min() < source.columns - 0.5
+        and column.max() > -0.5
+        and row.min() < source.rows - 0.5
+        and row.max() > -0.5
+    )
+    if not overlaps:
+        ours = ", ".join(f"{value:.6g}" for value in source.extent())
+        theirs = ", ".join(f"{value:.6g}" for value in target.extent())
+        raise MapError(
+            f"{name} does not overlap the heights: it covers ({ours}), they cover ({theirs}), as "
+            "(x_min, y_min, x_max, y_max) each in its own CRS; check the CRS of both"
+        )
