@@ -499,3 +499,6 @@ def test_too_few_levels_tell_no_step():
     block[10:20, 10:20] = 10.0
     assert quantisation_step(block) == 0.0
     assert quantisation_step(np.full((5, 5), np.nan)) == 0.0
+    undeclared = np.random.default_rng(0).normal(size=(40, 40))
+    undeclared[3, 3] = -3.4e38  # a no-data value that nobody declared leaves two levels
+    assert quantisation_step(undeclared) == 0.0

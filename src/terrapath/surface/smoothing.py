@@ -85,7 +85,7 @@ def quantisation_step(values: Array) -> float:
     gaps = np.diff(levels)
     gaps = gaps[gaps > 2.0 * rounding]
     # Differences that 32-bit numbers can hardly hold are no step that anybody chose.
-    if len(gaps) == 0 or (least := float(gaps.min())) < 8.0 * rounding:
+    if len(gaps) < FEWEST_LEVELS - 1 or (least := float(gaps.min())) < 8.0 * rounding:
         return 0.0
     multiples = np.rint(gaps / least)
     step = float(gaps.sum() / multiples.sum())
