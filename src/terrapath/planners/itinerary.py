@@ -15,8 +15,7 @@ import numpy as np
 from .. import metric
 from ..errors import InputError
 from ..problem import Path, Problem, Solution, Status
-from .base import SEPARATED, Callback, Planner, Progress
-from .finishing import INTERRUPT
+from .base import INTERRUPT, SEPARATED, Callback, Planner, Progress
 
 # From best to worst: a tour ends as its worst leg does.
 _WORSE = (Status.SOLVED, Status.NOT_FOUND, Status.INTERRUPTED, Status.UNREACHABLE)
