@@ -17,7 +17,7 @@ Point: TypeAlias = tuple[float, float]
 Points: TypeAlias = tuple[Point, ...]
 Rectangle: TypeAlias = tuple[float, float, float, float]
 Files: TypeAlias = tuple[str, ...]
-Smoothing: TypeAlias = float | Literal["auto", "none"]
+Extent: TypeAlias = float | Literal["auto", "none"]
 
 # How pydantic reads a section: unknown keys are errors, and so are NaN and infinity.
 STRICT: dict[str, Any] = {"extra": "forbid", "allow_inf_nan": False}
@@ -122,7 +122,7 @@ class MapSection:
         ),
     ] = 0.0
     smooth: Annotated[
-        Smoothing,
+        Extent,
         Option(
             "Smooth over this length (standard deviation, map units); auto is the least that "
             "heights rounded to a step need [default], none leaves the map as it is.",
@@ -391,6 +391,16 @@ class PlannerSection:
             example="60.0",
         ),
     ] = None
+    corridor: Annotated[
+        Extent,
+        Option(
+            "Maps of over 16 million cells are planned on coarse to fine: then around the coarse "
+            "route alone, within this distance, map units; auto is 40 coarse cells [default], none "
+            "plans on all of the map at once.",
+            'a finite number, "auto" or "none"',
+            form="WIDTH|auto|none",
+        ),
+    ] = "auto"
     target_length: Annotated[
         float | None,
         Option("Stop at a path this short, map units.", NUMBER, form="LENGTH", example="17.2"),
@@ -399,7 +409,7 @@ class PlannerSection:
     @property
     def own(self) -> dict[str, Any]:
         """The options of the planner itself that were given."""
-        general = {"name", "refine", "bound", "target_gap"}
+        general = {"name", "refine", "bound", "target_gap", "corridor"}
         given = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return {k: v for k, v in given.items() if k not in general and v is not None}
 

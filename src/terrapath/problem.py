@@ -291,6 +291,7 @@ class Solution:
     tree: SearchTree | None = None
     counters: dict[str, int] = field(default_factory=dict)
     legs: tuple[Solution, ...] = ()  # of a tour, from each waypoint to the next
+    corridor: Any = None  # where alone the lower bound holds; None for everywhere
 
     @property
     def length(self) -> float | None:
@@ -305,6 +306,13 @@ class Solution:
         if self.length == self.lower_bound:
             return 0.0
         return (self.length - self.lower_bound) / self.lower_bound
+
+    @property
+    def bounded(self) -> str:
+        """What the lower bound speaks of, in words: "no path is shorter"."""
+        which = " through these points" if self.legs else ""
+        where = "" if self.corridor is None else " in the corridor"
+        return f"no path{which}{where} is shorter"
 
     def __repr__(self) -> str:
         length = "no path" if self.length is None else f"length {self.length:.6f}"

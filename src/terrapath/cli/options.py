@@ -12,13 +12,13 @@ import typer
 from ..errors import InputError
 from ..options import (
     Declared,
+    Extent,
     Files,
     LayerTable,
     LayerTables,
     Point,
     Points,
     Rectangle,
-    Smoothing,
     Weights,
     options,
 )
@@ -85,14 +85,14 @@ def _parse_weights(texts: list[str], option: str, form: str) -> Weights:
     return weights
 
 
-def _parse_smoothing(text: str) -> Smoothing:
-    words: dict[str, Smoothing] = {"auto": "auto", "none": "none"}
+def _parse_extent(text: str, option: str) -> Extent:
+    words: dict[str, Extent] = {"auto": "auto", "none": "none"}
     if text in words:
         return words[text]
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"--smooth {text!r} is not a length; give metres, auto or none") from None
+        raise InputError(f"{option} {text!r} is not a length; give metres, auto or none") from None
 
 
 def _is_flag(declaration: Declared) -> bool:
@@ -121,7 +121,7 @@ def _value(declaration: Declared, given: Any) -> Any:
         (Rectangle | None, lambda text: _numbers(text, name, form, "a rectangle")),
         (LayerTables, lambda texts: _parse_layers(texts, flag, form)),
         (Weights, lambda texts: _parse_weights(texts, flag, form)),
-        (Smoothing, _parse_smoothing),
+        (Extent, lambda text: _parse_extent(text, flag)),
         (int | str | None, lambda text: int(text) if text.isdecimal() else text),
         (Files, tuple),
     ]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from ..errors import InputError
-from ..options import Scenario
+from ..options import Point, Scenario
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .outputs import RouteOutputs
@@ -16,7 +17,7 @@ from .question import Itinerary, Question, scenario_of
 
 if TYPE_CHECKING:
     from ..planners import Finished, GoalAnswer
-    from ..problem import Solution
+    from ..problem import Problem, Solution
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,49 @@ def _solve(planner: Finished, asked: Itinerary, every: bool, quiet: bool) -> Ans
         return Answer(nearest(goals), goals)
 
 
+def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
+    """Is the map too large to be planned on as a whole? InputError for what needs it whole."""
+    from ..corridor import MOST_CELLS
+
+    if scenario.planner.corridor == "none" or cells <= MOST_CELLS:
+        return False
+    for what, is_asked in (
+        ("several goals", len(scenario.route.goals) > 1),
+        ("--certificate", scenario.output.certificate is not None),
+    ):
+        if is_asked:
+            raise InputError(
+                f"the map has {cells:,} cells, so it is planned on in a corridor, and {what} needs "
+                "it whole; leave that out, shrink --bounds, or give --corridor none"
+            )
+    return True
+
+
+def _solve_in_corridor(
+    planner: Finished, question: Question, cells: int, outputs: RouteOutputs, quiet: bool
+) -> Answer:
+    """Plan on the map read coarser, and on the map itself around the route found there."""
+    from ..corridor import Part, plan_in_corridor
+    from .progress import progress_bar
+
+    def pose(part: Part) -> tuple[Problem, Sequence[Point]]:
+        asked = question.itinerary(part)
+        outputs.require_fit(asked.problem)
+        return asked.problem, asked.via
+
+    width = question.scenario.planner.corridor
+    with progress_bar(None, quiet) as callback:
+        return Answer(
+            plan_in_corridor(
+                pose,
+                planner,
+                cells,
+                half_width=width if isinstance(width, float) else None,
+                callback=callback,
+            )
+        )
+
+
 @with_options("map", "route", "constraints", "planner", "output")
 def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
     """Plan one route on a surface, and prove how far from the shortest it can be.
@@ -98,10 +142,13 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
     output, route = scenario.output, scenario.route
     outputs = RouteOutputs(output, len(route.via) + 1)
     outputs.check()
-    itinerary = Question(scenario).itinerary()
-    outputs.require_fit(itinerary.problem)
-    quiet = output.quiet or output.json
-    answer = _solve(planner, itinerary, route.all_goals, quiet)
+    question, quiet = Question(scenario), output.quiet or output.json
+    if is_planned_in_corridor(scenario, cells := question.cells()):
+        answer = _solve_in_corridor(planner, question, cells, outputs, quiet)
+    else:
+        itinerary = question.itinerary()
+        outputs.require_fit(itinerary.problem)
+        answer = _solve(planner, itinerary, route.all_goals, quiet)
     # Shown before it is written, so that a full disk loses no answer.
     _print(answer, scenario)
     if answer.solution.path is not None:

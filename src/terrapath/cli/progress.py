@@ -13,8 +13,11 @@ from .report import percent
 
 
 @contextmanager
-def progress_bar(problem: Problem, quiet: bool) -> Iterator[Callback | None]:
-    """A callback that draws the bar; None where nobody is watching."""
+def progress_bar(problem: Problem | None, quiet: bool) -> Iterator[Callback | None]:
+    """A callback that draws the bar; None where nobody is watching.
+
+    problem : tells the unit, where it is known beforehand.
+    """
     if quiet or not sys.stderr.isatty():
         yield None
         return
@@ -28,7 +31,7 @@ def progress_bar(problem: Problem, quiet: bool) -> Iterator[Callback | None]:
         MofNCompleteColumn(),
         TimeElapsedColumn(),
     )
-    unit = problem.surface.unit
+    unit = "" if problem is None else problem.surface.unit
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         # Until the first report the kernels are loaded, or compiled where they are new.
         task = bar.add_task("preparing kernels", total=None)

@@ -13,6 +13,7 @@ from ..options import MapSection, Point, Rectangle, Scenario
 from .options import is_scenario
 
 if TYPE_CHECKING:
+    from ..corridor import Corridor, Part
     from ..problem import Problem
     from ..surface import Surface
     from ..validation import Bounds
@@ -59,15 +60,16 @@ class Question:
 
     scenario: Scenario
 
-    def itinerary(self) -> Itinerary:
-        """From the start through the waypoints to the goals."""
-        place = self.place()
+    def itinerary(self, part: Part | None = None) -> Itinerary:
+        """From the start through the waypoints to the goals, on a part of the map."""
+        place = self.place(part)
         route = self.scenario.route
         start = self._end(place, "start", route.start)
         goals = tuple(self._to_plane(place, goal, "goal") for goal in route.goals)
         goals = goals or (self._end(place, "goal", None),)
         via = tuple(self._to_plane(place, point, "via") for point in route.via)
-        return Itinerary(self._problem(place, start, goals[0]), via, goals)
+        corridor = None if part is None else part.corridor
+        return Itinerary(self._problem(place, start, goals[0], corridor), via, goals)
 
     def problem_to_itself(self) -> Problem:
         """The problem that is asked about where there is no goal: from the start to the start."""
@@ -75,7 +77,9 @@ class Question:
         start = self._end(place, "start", self.scenario.route.start)
         return self._problem(place, start, start)
 
-    def _problem(self, place: Place, start: Point, goal: Point) -> Problem:
+    def _problem(
+        self, place: Place, start: Point, goal: Point, corridor: Corridor | None = None
+    ) -> Problem:
         from ..problem import Problem
 
         limits = self.scenario.constraints
@@ -88,6 +92,9 @@ class Question:
             for file in limits.obstacles:
                 obstacles.extend(read_obstacles(file, surface))
             area = None if limits.keep_in is None else read_area(limits.keep_in, surface)
+        if corridor is not None:
+            way = corridor.area_on(surface)
+            area = way if area is None else way.intersection(area)
         return Problem(
             surface,
             start,
@@ -100,10 +107,22 @@ class Question:
             name=place.name,
         )
 
-    def place(self) -> Place:
+    def cells(self) -> int:
+        """How many cells the map has that is asked about; 0 for a scene."""
+        asked = self.scenario.map
+        if asked.scene is not None:
+            return 0
+        from ..io.maps import count_cells
+
+        self._require_map()
+        band = 1 if asked.height_band is None else asked.height_band
+        window = self.scenario.route.bounds
+        return count_cells(asked.path, height_band=band, crs=asked.crs, within=window)
+
+    def place(self, part: Part | None = None) -> Place:
         """The scene or the map, weighted, and the region to plan in."""
         asked = self.scenario.map
-        found = self._map() if asked.scene is None else self._scene(asked.scene)
+        found = self._map(part) if asked.scene is None else self._scene(asked.scene)
         if asked.weights:
             found = found._replace(surface=found.surface.with_weights(asked.weights))
         rectangle = self.scenario.route.bounds
@@ -124,8 +143,8 @@ class Question:
         ends = {"start": scene.start, "goal": scene.goal}
         return Place(scene.surface, scene.bounds, scene.name, ends)
 
-    def _map(self) -> Place:
-        from ..io import read_surface
+    def _require_map(self) -> Path:
+        """The map's path; InputError where there can be none."""
         from ..scenes import names
 
         asked = self.scenario.map
@@ -134,8 +153,16 @@ class Question:
             raise InputError(
                 f"{asked.path!r} is neither a built-in scene ({', '.join(names())}) nor a file"
             )
-        window = self.scenario.route.bounds
-        surface = read_surface(asked.path, within=window, **read_options(asked))
+        return path
+
+    def _map(self, part: Part | None) -> Place:
+        from ..io import read_surface
+
+        path, asked = self._require_map(), self.scenario.map
+        window, decimate = self.scenario.route.bounds, 1
+        if part is not None:
+            window, decimate = part.within or window, part.decimate
+        surface = read_surface(asked.path, within=window, decimate=decimate, **read_options(asked))
         return Place(surface, None, path.stem, {})
 
     def _end(self, place: Place, name: str, point: Point | None) -> Point:

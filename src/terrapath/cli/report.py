@@ -65,8 +65,7 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
     unit = problem.surface.unit
     yield "true length", _amount(length, unit)
     if solution.lower_bound is not None and solution.gap is not None:
-        which = "path through these points" if solution.legs else "path"
-        yield "lower bound", _amount(solution.lower_bound, unit) + f"; no {which} is shorter"
+        yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bounded}"
         yield "gap", _gap(solution.gap, target_gap)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
@@ -97,6 +96,7 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
         yield f"layer {layer.name}", _weight(layer, surface.unit)
     for layer in getattr(surface, "costs", ()):
         yield f"cost {layer.name}", _exponent(layer)
+    yield from _corridor(solution)
     yield from _constraints(problem)
     yield from _lengths(solution, target_gap)
     yield "samples", f"{solution.samples:,}"
@@ -104,6 +104,22 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     if solution.counters:
         yield "counters", _counter_line(solution)
     yield "memory", f"{_peak_memory():,.0f} MB at most"
+
+
+def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
+    """Where alone the fine map was looked at, and what is sure of the rest."""
+    corridor, unit = solution.corridor, solution.problem.surface.unit
+    if corridor is None:
+        return
+    around = _amount(corridor.half_width, unit)
+    coarse = _amount(corridor.coarse.length, unit)
+    yield (
+        "corridor",
+        f"{around} on both sides of a route of {coarse}, planned on the map read "
+        f"{corridor.decimate} times coarser",
+    )
+    least = corridor.least_length(solution)
+    yield "elsewhere", f"no path on the map is shorter than {_amount(least, unit)}, by chords"
 
 
 def _each(surface: Surface, values: Iterable[float]) -> str:

@@ -322,6 +322,19 @@ def read_surface(
     )
 
 
+def count_cells(
+    source: Any, *, height_band: int | str = 1, crs: Any = None, within: Any = None
+) -> int:
+    """How many cells ``read_surface`` would read of the heights, from the header alone."""
+    given = parse_crs(crs, f"crs={crs!r}")
+    with gdal(), ExitStack() as files:
+        height = LayerSource(_as_path(source) if isinstance(source, str) else source, height_band)
+        view = View.whole(_open(height, files, given, heights=True))
+        if within is not None:
+            view = view.within(as_bounds(within, "within"))
+        return view.grid.rows * view.grid.columns
+
+
 def _read_all(parts: list[_Part], base: View, target: Grid, most_cells: int) -> Array:
     """All layers (layers, rows, columns) on the cells of the target."""
     views = [base, *(_view_onto(part, base, target) for part in parts[1:])]

@@ -41,7 +41,7 @@ def _title(solution: Solution) -> str:
         return title
     bound = format_length(solution.lower_bound, unit)
     gap = f"{100.0 * solution.gap:.3g} %"
-    return f"{title}\nproven: no path is shorter than {bound}, a gap of {gap}"
+    return f"{title}\nproven: {solution.bounded} than {bound}, a gap of {gap}"
 
 
 def draw_route(solution: Solution) -> Any:

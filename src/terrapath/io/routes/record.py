@@ -76,10 +76,25 @@ def _ends_in_degrees(solution: Solution) -> dict[str, Any]:
     }
 
 
+def _corridor(solution: Solution) -> dict[str, Any]:
+    """Where the bound holds, if not everywhere."""
+    corridor = solution.corridor
+    if corridor is None:
+        return {}
+    return {
+        "bound_holds": "in the corridor",
+        "corridor_half_width": corridor.half_width,
+        "corridor_decimate": corridor.decimate,
+        "coarse_length": corridor.coarse.length,
+        "lower_bound_everywhere": corridor.least_length(solution),
+    }
+
+
 def _measures(solution: Solution) -> dict[str, Any]:
     """How it ended, how long the route is, and how good."""
     path = solution.path
     return {
+        **_corridor(solution),
         "status": solution.status.value,
         "length": solution.length,
         "unrefined_length": None if solution.unrefined is None else solution.unrefined.length,
