@@ -1039,6 +1039,7 @@ def test_the_checker_shares_nothing_with_the_solver():
         "files",
         "lattice",
         "problem",
+        "surface.costs",
         "validation",
     }
     assert imports_of(kernels) == {"compiler", "surfaces"}

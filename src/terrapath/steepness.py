@@ -14,6 +14,7 @@ import scipy.ndimage
 from ._kernels.surfaces import Spline
 from .errors import InputError
 from .surface import Mask, Surface
+from .surface.georeference import metres_of
 from .validation import Array, Bounds
 
 # A cell is looked at in four by four steps: at five places along each side.
@@ -25,23 +26,6 @@ CELLS_PER_FEATURE = 4.0
 MOST_CELLS = 2**26
 # Cells around a point that may be why its own is blocked.
 REACH = 2
-
-# In metres. What is not listed is not compared.
-_METRES = {
-    "m": 1.0,
-    "metre": 1.0,
-    "metres": 1.0,
-    "meter": 1.0,
-    "meters": 1.0,
-    "km": 1000.0,
-    "kilometre": 1000.0,
-    "cm": 0.01,
-    "ft": 0.3048,
-    "foot": 0.3048,
-    "feet": 0.3048,
-    "us survey foot": 1200.0 / 3937.0,
-    "us-ft": 1200.0 / 3937.0,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,15 +54,16 @@ class Steepness:
     @cached_property
     def _scale(self) -> float:
         """Units of the plane in one of height."""
-        plane, height = self.surface.unit.lower(), self.surface.layers[0].unit.lower()
+        plane, height = self.surface.unit, self.surface.layers[0].unit
         if plane == height or not plane or not height:
             return 1.0
-        if plane not in _METRES or height not in _METRES:
+        theirs, ours = metres_of(height), metres_of(plane)
+        if theirs is None or ours is None:
             raise InputError(
                 f"max_slope={self.max_slope:g} cannot be told for heights in {height!r} on a "
                 f"plane in {plane!r}; give both in metres"
             )
-        return _METRES[height] / _METRES[plane]
+        return theirs / ours
 
     @cached_property
     def mask(self) -> Mask | None:

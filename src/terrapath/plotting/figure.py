@@ -49,7 +49,7 @@ def draw_route(solution: Solution) -> Any:
     from matplotlib.figure import Figure
 
     bounds = solution.problem.bounds
-    height = float(np.clip(PANEL_WIDTH * bounds.height / bounds.width, 3.8, 8.0)) + 0.8
+    height = float(np.clip(PANEL_WIDTH * bounds.height / bounds.width, 3.8, 8.0)) + 1.2
     figure = Figure(figsize=(14.0, height), layout="constrained")
     panels = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.05))
     draw_map(figure.add_subplot(panels[0]), solution)
