@@ -83,7 +83,7 @@ def test_the_command_writes_a_whole_report_and_measures_nothing_twice(tmp_path, 
 
     for kind in (bound.BoundTrial, marching.MarchTrial, paths.PathsTrial):
         monkeypatch.setattr(kind, "measure", lambda self: pytest.fail("measured again"))
-    monkeypatch.setattr(figures, "_save", lambda figure, path: None)
+    monkeypatch.setattr(figures, "save_figure", lambda figure, path: None)
     assert run(["benchmark", "--quick", "--quiet", "--output", str(tmp_path)]) == 0
     assert (tmp_path / "report.md").read_text() == text
     monkeypatch.setattr(runs, "_source_stamp", lambda: "other code")

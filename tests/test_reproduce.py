@@ -77,7 +77,7 @@ def program(directory, disturb, workers, when="stage == 'convergence, trees' and
         "    def watch(stage, done, total):\n"
         f"        if {when}: {disturb}\n"
         "    yield watch\n"
-        "command._stages = stages\n"
+        "command.stages = stages\n"
         f"sys.exit(run(['reproduce', 'convergence', '--quick', '--output', {str(directory)!r}, "
         f"'--workers', '{workers}']))\n"
     )
@@ -396,7 +396,7 @@ def test_a_scene_is_run_and_drawn_with_four_panels(tmp_path, monkeypatch):
     (path,) = data.at(1.0).rrt_star_r
     assert path.length > data.truth.true_length
     kept = []
-    monkeypatch.setattr(figures, "_save", lambda figure, path: kept.append(figure))
+    monkeypatch.setattr(figures, "save_figure", lambda figure, path: kept.append(figure))
     figures.draw("one-peak", data, settings, tmp_path)
     panels = [axes for axes in kept[0].axes if axes.get_title()]
     assert [axes.get_title()[:3] for axes in panels] == ["(a)", "(b)", "(c)", "(d)"]

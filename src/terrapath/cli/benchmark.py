@@ -9,13 +9,15 @@ from typing import Annotated
 import typer
 
 from .exit_codes import ExitCode
-from .reproduce import _stages
+from .reproduce import stages
 
 
 def benchmark_command(
     what: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[WHAT]...", help="Some of bound, fast-marching and path."),
+        typer.Argument(
+            metavar="[WHAT]...", help="Some of bound, fast-marching, path and large-maps."
+        ),
     ] = None,
     quick: Annotated[
         bool,
@@ -26,7 +28,7 @@ def benchmark_command(
     ] = Path("benchmark"),
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
 ) -> int:
-    """Measure bounds, fast marching and paths against the clock, the truth and the peers.
+    """Measure bounds, fast marching, paths and large maps: the clock, the truth and the peers.
 
     Peers that are not installed are named and left out. A run that was stopped goes on where
     it was when the same command is given again. Nothing else should run on the machine.
@@ -35,7 +37,7 @@ def benchmark_command(
     try:
         from ..experiments.benchmarks.run import benchmark
 
-        with _stages(quiet) as watch:
+        with stages(quiet) as watch:
             report = benchmark(what or (), output, quick=quick, watch=watch)
     except KeyboardInterrupt:
         print(

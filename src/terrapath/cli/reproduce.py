@@ -14,7 +14,7 @@ from .exit_codes import ExitCode
 
 
 @contextmanager
-def _stages(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+def stages(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A watcher that draws one bar a stage on standard error, where somebody is watching."""
     from ..experiments.runner import watch_nothing
 
@@ -77,7 +77,7 @@ def reproduce_command(
     try:
         from ..experiments.reproduce import reproduce
 
-        with _stages(quiet) as watch:
+        with stages(quiet) as watch:
             report = reproduce(what, output, quick=quick, seed=seed, workers=workers, watch=watch)
     except KeyboardInterrupt:
         print(

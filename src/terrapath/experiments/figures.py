@@ -31,13 +31,15 @@ from .paper import (
 DOTS_PER_INCH = 130
 
 
-def _figure(width: float, height: float) -> Any:
+def new_figure(width: float, height: float) -> Any:
+    """An empty matplotlib figure, inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def _save(figure: Any, path: Path) -> None:
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a picture, whole or not at all."""
     with written_whole(path) as temporary:
         figure.savefig(temporary, dpi=DOTS_PER_INCH)
 
@@ -52,7 +54,7 @@ def draw_scene(data: SceneData, settings: Settings, directory: Path) -> list[Pat
     problem = scenes.load(data.scene)
     ours, baseline = (_solve(data.scene, settings, chord=chord) for chord in (False, True))
     fan = GeodesicTraversal(directions=data.printed.directions).fan(problem)
-    figure = _figure(13.0, 11.0)
+    figure = new_figure(13.0, 11.0)
     panels = figure.add_gridspec(2, 2)
     view = figure.add_subplot(panels[0, 0], projection="3d")
     draw_perspective(view, ours)
@@ -70,7 +72,7 @@ def draw_scene(data: SceneData, settings: Settings, directory: Path) -> list[Pat
         f"(d) RRT* by chords: believed {baseline.cost:.5f}, true length {baseline.length:.5f}"
     )
     path = directory / f"{data.scene}.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]
 
 
@@ -81,7 +83,7 @@ def draw_comparative(data: ComparativeData, settings: Settings, directory: Path)
     assert full.path is not None
     carried = full.problem.path(plain.path.points)
     above = replace(plain, problem=full.problem, path=carried)
-    figure = _figure(18.0, 5.6)
+    figure = new_figure(18.0, 5.6)
     panels = figure.add_gridspec(1, 3)
     left = figure.add_subplot(panels[0], projection="3d")
     draw_perspective(left, plain)
@@ -93,26 +95,26 @@ def draw_comparative(data: ComparativeData, settings: Settings, directory: Path)
     draw_perspective(right, above)
     right.set_title(f"(c) the same path over the resistance: length {above.length:.5f}")
     surfaces = directory / "comparative.png"
-    _save(figure, surfaces)
+    save_figure(figure, surfaces)
 
-    figure = _figure(12.0, 4.4)
+    figure = new_figure(12.0, 4.4)
     paths = {"planned without resistance": carried, "planned with resistance": full.path}
     for layer, axes in enumerate(figure.subplots(1, 2)):
         draw_profiles(axes, paths, layer)
         axes.set_title(("(a) height", "(b) ground resistance")[layer])
     profiles = directory / "comparative-profiles.png"
-    _save(figure, profiles)
+    save_figure(figure, profiles)
     return [surfaces, profiles]
 
 
 def draw_repeat(data: list[RepeatData], settings: Settings, directory: Path) -> list[Path]:
     """Box plots with the true length as a line."""
-    figure = _figure(10.0, 5.0)
+    figure = new_figure(10.0, 5.0)
     for axes, runs in zip(figure.subplots(1, len(data)), data, strict=True):
         title = f"{runs.scene}, {len(runs.lengths)} runs"
         draw_box(axes, runs.lengths, runs.truth.true_length, title)
     path = directory / "repeat.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]
 
 
@@ -120,12 +122,12 @@ def draw_convergence_figure(
     data: ConvergenceData, settings: Settings, directory: Path
 ) -> list[Path]:
     """Length against samples."""
-    figure = _figure(7.5, 5.0)
+    figure = new_figure(7.5, 5.0)
     axes = figure.subplots()
     draw_convergence(axes, data.samples, np.array(data.lengths), data.true_length)
     axes.set_title(f"{data.scene}, {len(data.lengths[0])} runs for each number of samples")
     path = directory / "convergence.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]
 
 
@@ -133,7 +135,7 @@ def draw_sensitivity(
     data: list[SensitivityData], settings: Settings, directory: Path
 ) -> list[Path]:
     """For each scene its rays coloured by the movement of their ends, and the movement."""
-    figure = _figure(14.0, 5.2 * len(data))
+    figure = new_figure(14.0, 5.2 * len(data))
     panels = figure.add_gridspec(len(data), 2, width_ratios=(1.0, 1.25))
     for row, item in enumerate(data):
         problem = scenes.load(item.scene)
@@ -147,20 +149,20 @@ def draw_sensitivity(
         draw_movement(curve, angles, movement, item.sweep.length, exact)
         curve.set_title(f"movement of the end after {item.sweep.length:.5f} map units")
     path = directory / "sensitivity.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]
 
 
 def draw_smoothing(data: list[SmoothedPath], settings: Settings, directory: Path) -> list[Path]:
     """How the error of the length falls with the scale."""
-    figure = _figure(7.5, 5.0)
+    figure = new_figure(7.5, 5.0)
     axes = figure.subplots()
     for name, rows in by_surface(data).items():
         errors = np.array([row.relative_error for row in rows])
         draw_orders(axes, [row.scale for row in rows], errors, name)
     axes.set_title("geodesics of smoothed surfaces against those of the sharp ones")
     path = directory / "smoothing.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]
 
 

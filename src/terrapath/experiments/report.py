@@ -44,7 +44,10 @@ def _excess(value: float | None, true_length: float) -> str:
     return f"{round(100.0 * (value / true_length - 1.0), 2) + 0.0:+.2f} %"
 
 
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]], align: str = "---:") -> list[str]:
+def markdown_table(
+    header: Sequence[str], rows: Iterable[Sequence[str]], align: str = "---:"
+) -> list[str]:
+    """The lines of a table in Markdown; the first column is aligned to the left."""
     lines = [header, ["---", *[align] * (len(header) - 1)], *rows]
     return [*("| " + " | ".join(line) + " |" for line in lines), ""]
 
@@ -85,7 +88,7 @@ def _scene_table(data: SceneData) -> list[str]:
             [name, _length(printed.geodesic), _length(length), "", "", _length(truth), *excesses]
         )
     header = ["quantity", "paper", "ours (mean)", "least", "largest", "true length"]
-    return _table([*header, "paper's excess", "our excess"], rows)
+    return markdown_table([*header, "paper's excess", "our excess"], rows)
 
 
 def _step_table(data: SceneData) -> list[str]:
@@ -98,7 +101,7 @@ def _step_table(data: SceneData) -> list[str]:
         values = [text for v in (ours, believed, chord) for text in (_length(v), _excess(v, truth))]
         rows.append([f"{effect.step:g}", *values])
     header = ["step", "RRT\\*-R", "excess", "by chords, believed", "excess"]
-    return _table([*header, "by chords, true", "excess"], rows)
+    return markdown_table([*header, "by chords, true", "excess"], rows)
 
 
 def _scene_section(data: SceneData, settings: Settings) -> list[str]:
@@ -160,7 +163,7 @@ def _comparative_section(data: ComparativeData, settings: Settings) -> list[str]
         f"{settings.scale.seeds} runs. The paper prints no number here, but says that the path "
         "without resistance is shorter there and leads over the peaks of resistance.",
         "",
-        *_table([*header, "highest", "most resistance"], rows),
+        *markdown_table([*header, "highest", "most resistance"], rows),
     ]
 
 
@@ -177,7 +180,7 @@ def _repeat_section(data: list[RepeatData], settings: Settings) -> list[str]:
         f"{len(data[0].lengths)} runs, {settings.scale.samples:,} samples each. The paper shows "
         "box plots without numbers.",
         "",
-        *_table([*header, "true length", "excess of the mean"], rows),
+        *markdown_table([*header, "true length", "excess of the mean"], rows),
         *_outside_sector(data),
     ]
 
@@ -210,7 +213,7 @@ def _convergence_section(data: ConvergenceData, settings: Settings) -> list[str]
         f"that it prints was seen to have that length. Shown here is {CONVERGENCE_SCENE}, whose "
         f"true length is {data.true_length:.9f}.",
         "",
-        *_table(header, rows),
+        *markdown_table(header, rows),
     ]
 
 
@@ -241,7 +244,7 @@ def _sensitivity_section(data: list[SensitivityData], settings: Settings) -> lis
         f"flat ground it is the length itself. {len(data[0].found.angles):,} directions from 0 to "
         "90 degrees; the directions that move it the most:",
         "",
-        *_table(header, rows),
+        *markdown_table(header, rows),
     ]
 
 
@@ -272,7 +275,7 @@ def _smoothing_section(data: list[SmoothedPath], settings: Settings) -> list[str
     )
     return [
         *lines,
-        *_table(header, rows),
+        *markdown_table(header, rows),
         f"Order of the error in the scale, fitted over all scales: {orders}. A geodesic misses "
         "the apex of a cone, so its error is of second order; it crosses the edges of a pyramid, "
         "first order. A cliff's error goes as s times the root of a logarithm of 1/s, so its order "
@@ -320,7 +323,11 @@ def _open_settings(settings: Settings) -> list[str]:
             f"{settings.scale.directions:,} directions from {low:.0f} to {high:.0f} degrees",
         ],
     ]
-    return ["## What the paper leaves open", "", *_table(["setting", "chosen"], rows, align="---")]
+    return [
+        "## What the paper leaves open",
+        "",
+        *markdown_table(["setting", "chosen"], rows, align="---"),
+    ]
 
 
 def _scale_note(settings: Settings) -> list[str]:
@@ -339,7 +346,8 @@ def _scale_note(settings: Settings) -> list[str]:
     ]
 
 
-def _processor() -> str:
+def processor() -> str:
+    """What the machine calls its processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -348,12 +356,13 @@ def _processor() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def _machine() -> list[str]:
+def machine_lines() -> list[str]:
+    """The report's section on the machine and the versions of what matters."""
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "scipy", "numba", "matplotlib"))
     return [
         "## Machine and versions",
         "",
-        f"{_processor()}, {os.cpu_count()} logical cores, {platform.system()} "
+        f"{processor()}, {os.cpu_count()} logical cores, {platform.system()} "
         f"{platform.machine()}. terrapath {__version__}, Python {platform.python_version()}, "
         f"{packages}.",
     ]
@@ -376,4 +385,4 @@ def make_report(found: Mapping[str, tuple[Any, Sequence[Path]]], settings: Setti
         title, section = _SECTIONS[name]
         shown = [f"![{title}]({picture.name})" for picture in pictures]
         lines += [f"## {title}", "", *section(data, settings), *shown, ""]
-    return "\n".join([*lines, *_machine()]) + "\n"
+    return "\n".join([*lines, *machine_lines()]) + "\n"

@@ -33,7 +33,7 @@ def chosen_experiments(what: str) -> list[str]:
     return [what]
 
 
-def _claim(directory: Path, record: dict[str, Any]) -> None:
+def claim(directory: Path, record: dict[str, Any]) -> None:
     """Make the output directory, or find that it belongs to a run with the same settings."""
     where = f"output={str(directory)!r}"
     remedy = "name another --output, or delete it"
@@ -91,7 +91,7 @@ def reproduce(
     count = workers if workers is not None else os.cpu_count() or 1
     require_count(workers=count)
     directory = Path(output)
-    _claim(directory, {"version": __version__, "quick": quick, "seed": seed})
+    claim(directory, {"version": __version__, "quick": quick, "seed": seed})
     for file in (directory / REPORT_FILE, directory / TRIALS / REPORT_FILE):
         require_writable(file)
     settings = Settings(scale=QUICK if quick else FULL, seed=seed)

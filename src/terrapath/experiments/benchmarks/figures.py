@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..figures import _figure, _save
+from ..figures import new_figure, save_figure
 from .bound import GAP_TARGETS, BoundData
 from .marching import REFERENCE_ERRORS, MarchData, MarchRow
 from .paths import NEAR, TARGET_SCENE, TARGET_SECONDS, PathsData, PathsFound
@@ -29,7 +29,7 @@ def _label_plain(axis: Any) -> None:
 
 def draw_bound(data: BoundData, directory: Path) -> list[Path]:
     """Gap against seconds, a line a scene."""
-    figure = _figure(8.0, 5.4)
+    figure = new_figure(8.0, 5.4)
     axes = figure.subplots()
     for scene, found in data.items():
         seconds = [step.timing.seconds for step in found.steps]
@@ -60,7 +60,7 @@ def draw_bound(data: BoundData, directory: Path) -> list[Path]:
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=9)
     path = directory / "benchmark-bound.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]
 
 
@@ -92,7 +92,7 @@ def draw_marching(data: MarchData, directory: Path) -> list[Path]:
     rows: dict[str, list[MarchRow]] = {}
     for row in data.rows:
         rows.setdefault(row.scene, []).append(row)
-    figure = _figure(12.0, 5.0)
+    figure = new_figure(12.0, 5.0)
     left, right = figure.subplots(1, 2)
     _draw_seconds(left, rows)
     _draw_errors(right, rows)
@@ -105,7 +105,7 @@ def draw_marching(data: MarchData, directory: Path) -> list[Path]:
         axes.legend(fontsize=9)
     _label_plain(left.yaxis)
     path = directory / "benchmark-fast-marching.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]
 
 
@@ -143,7 +143,7 @@ def draw_paths(data: PathsData, directory: Path) -> list[Path]:
     """Excess against seconds, a panel a scene, a mark a planner."""
     columns = min(len(data.found), 3)
     rows = -(-len(data.found) // columns)
-    figure = _figure(4.4 * columns + 2.2, 3.7 * rows)
+    figure = new_figure(4.4 * columns + 2.2, 3.7 * rows)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, (scene, found) in zip(panels.flat, data.found.items(), strict=False):
         _draw_planners(axes, data.labels, found)
@@ -161,5 +161,5 @@ def draw_paths(data: PathsData, directory: Path) -> list[Path]:
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", fontsize=9)
     path = directory / "benchmark-path.png"
-    _save(figure, path)
+    save_figure(figure, path)
     return [path]

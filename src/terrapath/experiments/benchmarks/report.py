@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from ..report import NOTHING, _machine, _table
+from ..report import NOTHING, machine_lines, markdown_table
 from .bound import GAP_TARGETS, BoundData
+from .large_maps import LargeMapData
 from .marching import REFERENCE_ERRORS, MarchData, MarchRow
 from .paths import NEAR, PathsData, PathsFound
 from .peers import SCIKIT_FMM
@@ -41,7 +42,7 @@ def _targets_table(targets: Iterable[Target]) -> list[str]:
         unit = f" {target.unit}" if target.unit else ""
         found = NOTHING if target.found is None else f"{target.found:.3g}{unit}"
         rows.append([target.what, f"{target.limit:.3g}{unit}", found, target.verdict])
-    return _table(["target", "at most", "measured", "verdict"], rows)
+    return markdown_table(["target", "at most", "measured", "verdict"], rows)
 
 
 def bound_lines(data: BoundData) -> list[str]:
@@ -67,7 +68,7 @@ def bound_lines(data: BoundData) -> list[str]:
         f"Targets: {wanted}. `check` proves a "
         "certificate again from nothing but the problem.",
         "",
-        *_table(header, rows),
+        *markdown_table(header, rows),
     ]
 
 
@@ -109,7 +110,7 @@ def marching_lines(data: MarchData) -> list[str]:
         "library as published, and are not run here; it took 0.10 s on 241 nodes a side "
         "and 2.1 to 2.4 s on 961.",
         "",
-        *_table(header, map(_marching_row, data.rows)),
+        *markdown_table(header, map(_marching_row, data.rows)),
     ]
 
 
@@ -124,7 +125,7 @@ def _paths_table(data: PathsData, shown: str) -> list[str]:
         [label, *(cell(found[k]) for found in data.found.values())]
         for k, label in enumerate(data.labels)
     ]
-    return _table([shown, *data.found], rows)
+    return markdown_table([shown, *data.found], rows)
 
 
 def _proofs(data: PathsData) -> Iterable[str]:
@@ -149,6 +150,32 @@ def paths_lines(data: PathsData) -> list[str]:
         *_paths_table(data, "excess"),
         *_proofs(data),
         "",
+    ]
+
+
+def large_maps_lines(data: LargeMapData) -> list[str]:
+    """Each map."""
+    rows = [
+        [
+            f"{cells:,}",
+            _seconds(found.timing),
+            NOTHING if found.memory_peak is None else f"{found.memory_peak / 1e9:.2f}",
+            f"{found.length:,.0f}",
+            f"{found.coarse_length:,.0f}",
+            percent(found.length / found.corridor_bound - 1.0),
+            percent(found.length / found.least_length - 1.0),
+        ]
+        for cells, found in data.found.items()
+    ]
+    header = ["cells a side", "seconds", "GB in all", "length (m)", "coarse length (m)"]
+    header += ["gap in the corridor", "gap on the map"]
+    return [
+        "A synthetic map, a tiled GeoTIFF of 32-bit heights with hills of all sizes, noise in "
+        "every cell and a lake without data, from corner to corner over ground of at most 30 degrees: "
+        "read coarser, planned on, then read and planned on in a corridor around the coarse route, "
+        "fast marching with refinement and bound. A process of its own, warm; memory is its peak.",
+        "",
+        *markdown_table(header, rows),
     ]
 
 
@@ -178,4 +205,4 @@ def make_report(found: Mapping[str, Finding], scale: Scale) -> str:
     for finding in found.values():
         shown = [f"![{finding.title}]({picture.name})" for picture in finding.pictures]
         lines += [f"## {finding.title}", "", *finding.lines, *shown, ""]
-    return "\n".join([*lines, *_machine()]) + "\n"
+    return "\n".join([*lines, *machine_lines()]) + "\n"

@@ -11,11 +11,11 @@ from typing import Any
 from ... import __version__
 from ...errors import InputError
 from ...files import require_writable, written_whole
-from ..report import _processor
-from ..reproduce import REPORT_FILE, TRIALS, _claim
+from ..report import processor
+from ..reproduce import REPORT_FILE, TRIALS, claim
 from ..runner import Runner, Watch, watch_nothing
 from ..trials import Store
-from . import bound, figures, marching, paths, report
+from . import bound, figures, large_maps, marching, paths, report
 from .settings import FULL, QUICK, Scale
 from .timing import Target, Timing, percent
 
@@ -67,6 +67,14 @@ EXPERIMENTS = {
         lambda data: [runs.timing for found in data.found.values() for runs in found],
         figures.draw_paths,
     ),
+    "large-maps": Experiment(
+        "Large maps: seconds and memory",
+        large_maps.run_large_maps,
+        large_maps.large_maps_targets,
+        report.large_maps_lines,
+        lambda data: [found.timing for found in data.found.values()],
+        lambda data, directory: [],
+    ),
 }
 
 
@@ -105,7 +113,7 @@ def benchmark(
     scale = QUICK if quick else FULL
     directory = Path(output)
     record = {"version": __version__, "source": _source_stamp(), "quick": quick}
-    _claim(directory, {**record, "machine": _processor()})
+    claim(directory, {**record, "machine": processor()})
     for file in (directory / REPORT_FILE, directory / TRIALS / REPORT_FILE):
         require_writable(file)
     # One at a time: trials that run side by side would disturb each other's clocks.

@@ -23,6 +23,7 @@ class Scale:
         *((241, 9), (481, 9), (961, 7)),
         *((1001, 7), (2001, 5), (4001, 2)),
     )
+    map_cells: tuple[int, ...] = (5_000, 10_000)  # on a side
     path_repeats: int = 9
     slow_repeats: int = 3  # of planners that take seconds, or that chance has a part in
     tree_samples: tuple[int, ...] = (3_000, 10_000, 30_000)
@@ -34,6 +35,7 @@ QUICK = Scale(
     target_gap=1e-3,
     bound_repeats=1,
     lattices=((241, 3), (1001, 3)),
+    map_cells=(2_500,),
     path_repeats=3,
     slow_repeats=1,
     tree_samples=(3_000, 10_000),
