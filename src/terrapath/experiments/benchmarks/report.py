@@ -9,7 +9,7 @@ from statistics import median
 
 from ..report import NOTHING, machine_lines, markdown_table
 from .bound import GAP_TARGETS, BoundData
-from .large_maps import LargeMapData
+from .large_maps import STEEPEST, LargeMapData
 from .marching import REFERENCE_ERRORS, MarchData, MarchRow
 from .paths import NEAR, PathsData, PathsFound
 from .peers import SCIKIT_FMM
@@ -171,9 +171,10 @@ def large_maps_lines(data: LargeMapData) -> list[str]:
     header += ["gap in the corridor", "gap on the map"]
     return [
         "A synthetic map, a tiled GeoTIFF of 32-bit heights with hills of all sizes, noise in "
-        "every cell and a lake without data, from corner to corner over ground of at most 30 degrees: "
-        "read coarser, planned on, then read and planned on in a corridor around the coarse route, "
-        "fast marching with refinement and bound. A process of its own, warm; memory is its peak.",
+        "every cell and a lake without data, from corner to corner over ground of at most "
+        f"{STEEPEST:g} degrees: read coarser, planned on, then read and planned on in a corridor "
+        "around the coarse route, by fast marching with refinement and bound. A process of its "
+        "own, warm; memory is its peak.",
         "",
         *markdown_table(header, rows),
     ]
