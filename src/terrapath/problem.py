@@ -291,6 +291,7 @@ class Solution:
     tree: SearchTree | None = None
     counters: dict[str, int] = field(default_factory=dict)
     legs: tuple[Solution, ...] = ()  # of a tour, from each waypoint to the next
+    options: dict[str, Any] = field(default_factory=dict)  # of the planner, as it was run
     corridor: Any = None  # where alone the lower bound holds; None for everywhere
 
     @property

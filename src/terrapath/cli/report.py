@@ -94,7 +94,7 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     yield from _fit(surface)
     for layer in surface.layers:
         yield f"layer {layer.name}", _weight(layer, surface.unit)
-    for layer in getattr(surface, "costs", ()):
+    for layer in surface.costs:
         yield f"cost {layer.name}", _exponent(layer)
     yield from _corridor(solution)
     yield from _constraints(problem)
@@ -124,7 +124,7 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
 
 def _each(surface: Surface, values: Iterable[float]) -> str:
     """A number of each layer, with its name and unit."""
-    layers = (*surface.layers, *getattr(surface, "costs", ()))
+    layers = (*surface.layers, *surface.costs)
     shown = zip(layers, values, strict=False)
     return ", ".join(f"{layer.name} {value:.2g} {layer.unit}".rstrip() for layer, value in shown)
 
@@ -160,10 +160,8 @@ def _exponent(layer: Layer) -> str:
 
 def _contributions(path: Path) -> Iterator[tuple[str, str]]:
     """What share of the length each layer makes."""
-    shares = getattr(path, "contributions", None)
-    if shares:
-        parts = (f"{percent(share)} {name}" for name, share in shares.items())
-        yield "length made of", ", ".join(parts)
+    parts = (f"{percent(share)} {name}" for name, share in path.contributions.items())
+    yield "length made of", ", ".join(parts)
 
 
 def _constraints(problem: Problem) -> Iterator[tuple[str, str]]:

@@ -312,7 +312,7 @@ def read_surface(
         scale = _scale(smoothing, base, target.cell, factor)
     raster = Raster.on(target, bands)
     has_costs = any(part.kind == "cost" for part in parts)
-    return (raster.trimmed() if base.grid.needs_warp else raster).to_surface(
+    surface = (raster.trimmed() if base.grid.needs_warp else raster).to_surface(
         names=[part.name for part in parts],
         units=[unit, *(part.band.unit for part in parts[1:])],
         weights=[part.weight for part in parts],
@@ -320,6 +320,7 @@ def read_surface(
         fill_holes=float(fill_holes),
         smoothing=scale,
     )
+    return replace(surface, source=parts[0].band.label)
 
 
 def count_cells(

@@ -6,6 +6,7 @@ import math
 import time
 import warnings
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ..bounding import lower_bound
 from ..certificate import Certificate
@@ -54,12 +55,20 @@ class Finished:
         """The planner's name on the command line."""
         return self.planner.name
 
+    def _options(self) -> dict[str, Any]:
+        """What was asked for, as far as it says anything."""
+        own = vars(self.planner).items()
+        options = {name: value for name, value in own if not name.startswith("_")}
+        options |= {"refine": self.refine, "bound": self.bound, "target_gap": self.target_gap}
+        return {name: value for name, value in options.items() if value is not None}
+
     def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
         """Plan and finish. ``callback`` sees the progress and may stop the planner or the bound.
 
         A planner that was stopped by it is finished all the same.
         """
         solution = self.planner.solve(problem, callback=callback)
+        solution = replace(solution, options=self._options())
         return finish(
             solution,
             refine=self.refine,

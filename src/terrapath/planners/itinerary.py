@@ -249,6 +249,7 @@ def joined(problem: Problem, legs: Sequence[Solution], count: int) -> Solution:
         seconds=sum(leg.seconds for leg in legs),
         samples=sum(leg.samples for leg in legs),
         seed=legs[0].seed,
+        options=legs[0].options,
         stopped_by=_reasons(legs, count),
         unrefined=_unrefined(problem, legs) if is_whole else None,
         counters=dict(counters),

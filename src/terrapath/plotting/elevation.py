@@ -76,7 +76,7 @@ def draw_charts(figure: Any, solution: Solution, path: Path) -> None:
         len(ratios), sharex=True, squeeze=False, gridspec_kw={"height_ratios": ratios}
     )[:, 0]
     _draw_height(axes[0], path)
-    _draw_slopes(axes[1], distance, slopes(path), getattr(problem, "max_slope", None))
+    _draw_slopes(axes[1], distance, slopes(path), problem.max_slope)
     for panel, shown in zip(axes[2:], more, strict=True):
         _draw_layer(panel, distance, shown)
     _mark_vias(axes, solution, path)

@@ -153,6 +153,7 @@ class Surface:
     georeference: Georeference | None = None
     costs: tuple[Layer, ...] = ()  # the layers of the kind "cost"; ``layers`` are the others
     cost_data: Spline | None = None  # their logarithms, before their weights
+    source: str = ""  # the map that it was read from
 
     def __post_init__(self) -> None:
         steepest = _steepest(self.data)

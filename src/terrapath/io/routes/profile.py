@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -76,11 +76,9 @@ def profile_columns(solution: Solution) -> list[Column]:
 
 def further_layers(path: Path) -> list[Column]:
     """All layers along the profile but the height: those whose changes cost, then the costs."""
-    surface: Any = path.surface
-    profile: Any = path.profile
-    costs = getattr(surface, "costs", ())
-    values = [*profile.values.T[1:], *(profile.costs.T if costs else ())]
-    layers = [*surface.layers[1:], *costs]
+    surface, profile = path.surface, path.profile
+    values = [*profile.values.T[1:], *profile.costs.T]
+    layers = [*surface.layers[1:], *surface.costs]
     return [Column(a.name, a.unit, v) for a, v in zip(layers, values, strict=True)]
 
 

@@ -51,9 +51,9 @@ def provenance(solution: Solution) -> dict[str, Any]:
         "layers": {layer.name: layer.weight for layer in surface.layers},
     }
     known = {
-        "costs": {layer.name: layer.weight for layer in getattr(surface, "costs", ())},
-        "options": getattr(solution, "options", None),
-        "map": getattr(surface, "source", None),
+        "costs": {layer.name: layer.weight for layer in surface.costs},
+        "options": solution.options,
+        "map": surface.source,
     }
     found |= {key: value for key, value in known.items() if value}
     if surface.georeference is not None:
@@ -103,7 +103,7 @@ def _measures(solution: Solution) -> dict[str, Any]:
         "gap": solution.gap,
         "climb": None if path is None else path.climb,
         "straight_length": solution.problem.straight_length,
-        "contributions": getattr(path, "contributions", None),
+        "contributions": None if path is None else path.contributions,
         "unit": solution.problem.surface.unit,
     }
 
