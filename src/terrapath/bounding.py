@@ -27,7 +27,7 @@ from .validation import Array, Bounds, require_positive
 Watch = Callable[[Certificate], bool | None]
 
 # Lattices tried, nodes on the longer side, the first where nothing better is asked for.
-SIDES = (120, 240, 480, 800, 1400)
+SIDES = (120, 240, 360, 480, 800, 1400)
 
 # Repairs of one lattice at most, before the next finer one is tried.
 REPAIRS = 3
