@@ -75,7 +75,7 @@ CALL = (
     "from copied.caller import caller; from copied.callee import callee\n"
     "from copied import compiler\n"
     "first = caller(1.0, 3); told_first = list(told); second = callee(1.0, 3)\n"
-    "parts = len(callee.get_call_template.__self__.overloads)\n"
+    "parts = len(callee.part().overloads)\n"
     "print(json.dumps([first, second, told_first, told, parts, len(compiler.cached_files())]))"
 )
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import logging
 import platform
-from collections.abc import Callable
-from functools import wraps
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, cached_property, wraps
 from pathlib import Path
 from typing import Any
 
@@ -50,16 +52,25 @@ class _CacheFile(IndexDataCacheFile):
         self._save_index({**self._load_index(), key: name})
 
 
-class _PackageCache(FunctionCache):
+class _PackageCache:
     """Numba's on-disk cache, made stale by a change in *any* kernel module.
 
     Numba alone looks only at the file that defines a function, so an edited callee
-    in another module would leave its callers running old code.
+    in another module would leave its callers running old code. The cache is looked for at the
+    first call from Python, which most kernels never get.
     """
 
     def __init__(self, function: Kernel) -> None:
-        super().__init__(function)
-        self._cache_file = _CacheFile(self.cache_path, self._impl.filename_base, _STAMP)
+        self._function = function
+
+    @cached_property
+    def _cache(self) -> FunctionCache:
+        found = FunctionCache(self._function)
+        found._cache_file = _CacheFile(found.cache_path, found._impl.filename_base, _STAMP)
+        return found
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._cache, name)
 
 
 # Kernels that other kernels call
@@ -84,6 +95,10 @@ class _Library(JITCodeLibrary):
 class _PartLibrary(_Library):
     """Intermediate code alone: it is linked and optimised where a kernel calls it."""
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Only what is needed to link: all is optimised later."""
+        ll_module.data_layout = self._codegen._data_layout
+
     def finalize(self) -> None:
         self._raise_if_finalized()
         self._finalize_dynamic_globals()
@@ -97,7 +112,21 @@ class _KernelCompiler(Compiler):
         _LOG.info("compiling %s", function.__qualname__)
         self.state.library = _Library(self.state.targetctx.codegen(), function.__qualname__)
         self.state.library.enable_object_caching()
-        return super().compile_extra(function)
+        with _garbage_left():
+            return super().compile_extra(function)
+
+
+@contextmanager
+def _garbage_left() -> Iterator[None]:
+    """No look for garbage meanwhile: a compiler makes many objects, and a quarter longer so."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
 
 
 class _PartCompiler(Compiler):
@@ -153,9 +182,15 @@ def _compile(function: Kernel, *, inline: bool = False, allocates: bool = False)
         pipeline_class=_KernelCompiler,
     )(function)
     dispatcher._cache = _PackageCache(function)
-    options = {**dispatcher.targetoptions, "no_cpython_wrapper": True}
-    part = _Part(function, targetoptions=options, pipeline_class=_PartCompiler)
-    dispatcher.get_call_template, dispatcher.get_overload = part.get_call_template, part.get_overload
+
+    @cache
+    def part() -> _Part:
+        options = {**dispatcher.targetoptions, "no_cpython_wrapper": True}
+        return _Part(function, targetoptions=options, pipeline_class=_PartCompiler)
+
+    dispatcher.get_call_template = lambda args, kws: part().get_call_template(args, kws)
+    dispatcher.get_overload = lambda sig: part().get_overload(sig)
+    dispatcher.part = part
     _kernels.append(dispatcher)
     return dispatcher
 
