@@ -281,7 +281,10 @@ def test_commands_are_measured_as_whole_processes(runner, monkeypatch):
     monkeypatch.setattr(startup, "LIMITS", QUICK_COMMANDS)
     data = startup.run_startup(TINY, runner)
     (helping, helped), (listing, listed) = data.found
-    assert (helping.label, listing.label) == ("`terrapath --help`, warm", "`terrapath scenes`, cold")
+    assert (helping.label, listing.label) == (
+        "`terrapath --help`, warm",
+        "`terrapath scenes`, cold",
+    )
     assert (len(helped.timing.wall), len(listed.timing.wall)) == (2, 1)
     assert 0.0 < helped.timing.seconds < listed.timing.seconds
     assert [target.met for target in startup.startup_targets(data)] == [True, False]

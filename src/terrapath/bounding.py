@@ -14,8 +14,8 @@ import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from .certificate import Certificate, Core, Needs, cell_needs, certify, fingerprint
 from .eikonal import Medium, march_from, model_source, near_distance, window_radius

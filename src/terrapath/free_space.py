@@ -193,8 +193,10 @@ class FreeSpace:
         """What makes a point not free, in words; None where it is free."""
         if not self.bounds.contains(np.array(point)):
             return f"outside the bounds {self.bounds}"
-        if not self.has_obstacles:
-            return None
+        return self._obstacle_at(point) if self.has_obstacles else None
+
+    def _obstacle_at(self, point: tuple[float, float]) -> str | None:
+        """What obstacle makes a point not free, in words."""
         masks = range(len(self.masks))
         if any(kernels.mask_is_hit(self.data, mask, *point, *point) for mask in masks):
             return "in a blocked or no-data cell"

@@ -60,9 +60,8 @@ def spline() -> Surface:
     axis = np.linspace(0.0, SIDE, 25)
     x, y = np.meshgrid(axis, axis)
     hill = np.exp(-0.1 * ((x - 5.0) ** 2 + (y - 6.0) ** 2))
-    return Surface.from_grid(
-        np.stack([hill, 1.0 + 0.5 * hill]), axis, axis, names=["height", "mud"], costs=["mud"]
-    )
+    values = np.stack([hill, 1.0 + 0.5 * hill])
+    return Surface.from_grid(values, axis, axis, kinds=["rise", "cost"])
 
 
 SURFACES: dict[str, Callable[[], Surface]] = {"peaks": peaks, "splines": spline}
