@@ -19,10 +19,11 @@ from .errors import InputError
 from .files import written_whole
 from .free_space import Circle
 from .geodesics import christoffel_symbols, gaussian_curvature
+from .metric import chord, line_r
 from .planners import plan
 from .problem import Problem
 from .refinement import refine
-from .surface import Surface
+from .surface import Mask, Surface
 
 # Called with what is being compiled, how many rehearsals are done, and of how many.
 Watch = Callable[[str, int, int], None]
@@ -72,7 +73,9 @@ def _open_ground(surface: Surface) -> Problem:
 
 
 def _with_obstacles(surface: Surface) -> Problem:
-    obstacles = [shapely.box(3.0, 3.0, 4.0, 8.0), Circle(8.0, 7.0, 1.0)]
+    corner = np.arange(4.0)
+    mask = Mask(np.eye(4, dtype=bool)[::-1], corner, corner + SIDE - 3.0)
+    obstacles = [shapely.box(3.0, 3.0, 4.0, 8.0), Circle(8.0, 7.0, 1.0), mask]
     return Problem(surface, START, GOAL, (0.0, 0.0, SIDE, SIDE), obstacles)
 
 
@@ -99,6 +102,11 @@ def _search_grid(surface: Surface) -> None:
     plan(_with_obstacles(surface), "a-star", spacing=1.0)
 
 
+def _measure(surface: Surface) -> None:
+    line_r(surface, START, GOAL)
+    chord(surface, START, GOAL)
+
+
 def _shoot(surface: Surface) -> None:
     christoffel_symbols(surface, START)
     gaussian_curvature(surface, START)
@@ -115,6 +123,7 @@ KINDS: dict[str, Callable[[Surface], None]] = {
     "trees": _grow,
     "fast marching": _march,
     "geodesics": _shoot,
+    "lengths": _measure,
     "grids": _search_grid,
     "distinct routes": _find_routes,
 }

@@ -82,7 +82,8 @@ def run_afresh(arguments: tuple[str, ...], cache: str) -> Reading:
     before, watch = _seconds_of_children(), Stopwatch()
     done = subprocess.run(
         [sys.executable, "-c", COMMAND, *arguments],
-        env={**os.environ, "NUMBA_CACHE_DIR": cache},
+        # An installed package has its bytecode on disk.
+        env={**os.environ, "NUMBA_CACHE_DIR": cache, "PYTHONDONTWRITEBYTECODE": ""},
         capture_output=True,
         text=True,
         check=False,
