@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -61,7 +62,7 @@ def _blocked_nodes(problem: Problem, lattice: Lattice) -> npt.NDArray[np.bool_]:
         return np.zeros((lattice.ny, lattice.nx), bool)
     covered = np.pad(problem.free_space.covered_cells(lattice), 2, constant_values=True)
     # Window of 4 x 4 cells around a node.
-    return ~_windows(~covered, 4)
+    return np.asarray(~_windows(~covered, 4))
 
 
 def _largest_within(values: Array, reach: int) -> Array:
@@ -69,13 +70,13 @@ def _largest_within(values: Array, reach: int) -> Array:
 
     As SciPy's maximum_filter, which takes longer to import than to run.
     """
-    return _windows(np.pad(values, reach, mode="edge"), 2 * reach + 1)
+    return np.asarray(_windows(np.pad(values, reach, mode="edge"), 2 * reach + 1))
 
 
-def _windows(values: Array, size: int) -> Array:
-    """Largest of each window of size x size."""
+def _windows(values: Any, size: int) -> Any:
+    """Largest of each window of size x size, numbers or truth values."""
     rows = sliding_window_view(values, size, axis=0).max(axis=-1)
-    return np.asarray(sliding_window_view(rows, size, axis=1).max(axis=-1))
+    return sliding_window_view(rows, size, axis=1).max(axis=-1)
 
 
 def _cores(problem: Problem, lattice: Lattice) -> tuple[Core, Core]:
