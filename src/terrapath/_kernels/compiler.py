@@ -91,6 +91,11 @@ class _Library(JITCodeLibrary):
         if isinstance(library, _PartLibrary):
             self._linking_libraries.extend(library._linking_libraries)
 
+    def _optimize_final_module(self) -> None:
+        """All passes at once; Numba's own, cheap ones before them are for counted references."""
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
 
 class _PartLibrary(_Library):
     """Intermediate code alone: it is linked and optimised where a kernel calls it."""
