@@ -11,7 +11,15 @@ import pytest
 from terrapath import scenes
 from terrapath.cli.main import run
 from terrapath.errors import TerrapathError
-from terrapath.experiments.benchmarks import bound, figures, fresh, large_maps, marching, paths
+from terrapath.experiments.benchmarks import (
+    bound,
+    figures,
+    fresh,
+    large_maps,
+    marching,
+    paths,
+    startup,
+)
 from terrapath.experiments.benchmarks import report as reports
 from terrapath.experiments.benchmarks import run as runs
 from terrapath.experiments.benchmarks.peers import SCIKIT_FMM, Peer
@@ -38,7 +46,12 @@ TINY = Scale(
     slow_repeats=2,
     tree_samples=(500,),
     most_samples=2_000,
+    warm_starts=2,
+    cold_starts=1,
 )
+
+
+QUICK_COMMANDS = {(startup.HELP, False): 1e3, (("scenes",), True): 1e-3}
 
 
 def here(trial):
@@ -49,6 +62,7 @@ def here(trial):
 @pytest.fixture
 def tiny(monkeypatch):
     monkeypatch.setattr(runs, "QUICK", TINY)
+    monkeypatch.setattr(startup, "LIMITS", QUICK_COMMANDS)
     # Whoever edits the package meanwhile changes nothing here.
     monkeypatch.setattr(runs, "_source_stamp", lambda: "this code")
 
@@ -75,7 +89,7 @@ def test_the_command_writes_a_whole_report_and_measures_nothing_twice(tmp_path, 
     assert "## Machine and versions" in text
     for name, experiment in runs.EXPERIMENTS.items():
         assert f"## {experiment.title}" in text
-        if name != "large-maps":
+        if name not in ("large-maps", "startup"):
             assert f"![{experiment.title}](benchmark-{name}.png)" in text
             assert (tmp_path / f"benchmark-{name}.png").stat().st_size > 10_000
     assert "| 600 |" in text
@@ -84,7 +98,10 @@ def test_the_command_writes_a_whole_report_and_measures_nothing_twice(tmp_path, 
     assert all(line.endswith(" |") for line in tables)
     assert "nan" not in text
 
-    kinds = (bound.BoundTrial, marching.MarchTrial, paths.PathsTrial, large_maps.LargeMapTrial)
+    kinds = (
+        *(bound.BoundTrial, marching.MarchTrial, paths.PathsTrial),
+        *(large_maps.LargeMapTrial, startup.StartTrial),
+    )
     for kind in kinds:
         monkeypatch.setattr(kind, "measure", lambda self: pytest.fail("measured again"))
     monkeypatch.setattr(figures, "save_figure", lambda figure, path: None)
@@ -95,7 +112,7 @@ def test_the_command_writes_a_whole_report_and_measures_nothing_twice(tmp_path, 
 
 
 def test_experiments_are_chosen_by_name(tmp_path, capsys):
-    names = ["bound", "fast-marching", "path", "large-maps"]
+    names = ["bound", "fast-marching", "path", "large-maps", "startup"]
     assert runs.chosen_experiments([]) == list(runs.EXPERIMENTS) == names
     assert runs.chosen_experiments(["path", "bound", "path"]) == ["bound", "path"]
     assert run(["benchmark", "speed", "--output", str(tmp_path / "new")]) == 2
@@ -258,6 +275,47 @@ def test_every_planner_is_measured_and_lattices_never_get_near(runner):
     assert len(set(found["RRT\\*-R, 500 samples"].excess)) == 2
     (target,) = paths.paths_targets(paths.PathsData(data.labels, {"six-peaks": [refined]}))
     assert target.found == refined.timing.seconds
+
+
+def test_commands_are_measured_as_whole_processes(runner, monkeypatch):
+    monkeypatch.setattr(startup, "LIMITS", QUICK_COMMANDS)
+    data = startup.run_startup(TINY, runner)
+    (helping, helped), (listing, listed) = data.found
+    assert (helping.label, listing.label) == (
+        "`terrapath --help`, warm",
+        "`terrapath scenes`, cold",
+    )
+    assert (len(helped.timing.wall), len(listed.timing.wall)) == (2, 1)
+    assert 0.0 < helped.timing.seconds < listed.timing.seconds
+    assert [target.met for target in startup.startup_targets(data)] == [True, False]
+    assert "| `terrapath --help`, warm |" in "\n".join(reports.startup_lines(data))
+    assert json.loads(json.dumps(dataclasses.asdict(helped))) == {
+        "timing": {"wall": list(helped.timing.wall), "processor": list(helped.timing.processor)}
+    }
+
+
+def test_a_cold_start_finds_an_empty_cache_and_a_warm_one_does_not(runner, monkeypatch):
+    caches = []
+
+    def note(arguments, cache):
+        caches.append(cache)
+        return Reading(1.0, 1.0)
+
+    monkeypatch.setattr(startup, "run_afresh", note)
+    runs_of = {
+        cold: startup.StartRuns(arguments=("plan",), cold=cold, repeats=2) for cold in (True, False)
+    }
+    startup.StartTrial("start", runs_of[True]).measure()
+    assert len(set(caches)) == 2
+    caches.clear()
+    startup.StartTrial("start", runs_of[False]).measure()
+    assert len(caches) == 3
+    assert len(set(caches)) == 1
+
+
+def test_a_command_that_fails_is_one_line(tmp_path):
+    with pytest.raises(TerrapathError, match=r"terrapath plan nowhere ended with code 2: "):
+        startup.run_afresh(("plan", "nowhere"), str(tmp_path))
 
 
 def test_the_scenes_are_those_with_a_true_length():

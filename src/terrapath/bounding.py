@@ -12,10 +12,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter, minimum_filter
+from numpy.lib.stride_tricks import sliding_window_view
 
 from .certificate import Certificate, Core, Needs, cell_needs, certify, fingerprint
 from .eikonal import Medium, march_from, model_source, near_distance, window_radius
@@ -61,8 +62,21 @@ def _blocked_nodes(problem: Problem, lattice: Lattice) -> npt.NDArray[np.bool_]:
         return np.zeros((lattice.ny, lattice.nx), bool)
     covered = np.pad(problem.free_space.covered_cells(lattice), 2, constant_values=True)
     # Window of 4 x 4 cells around a node.
-    inside = minimum_filter(covered, size=4, mode="constant", cval=True)
-    return np.asarray(inside[2 : 2 + lattice.ny, 2 : 2 + lattice.nx])
+    return np.asarray(~_windows(~covered, 4))
+
+
+def _largest_within(values: Array, reach: int) -> Array:
+    """Largest of the values (ny, nx) at most ``reach`` rows and columns away.
+
+    As SciPy's maximum_filter, which takes longer to import than to run.
+    """
+    return np.asarray(_windows(np.pad(values, reach, mode="edge"), 2 * reach + 1))
+
+
+def _windows(values: Any, size: int) -> Any:
+    """Largest of each window of size x size, numbers or truth values."""
+    rows = sliding_window_view(values, size, axis=0).max(axis=-1)
+    return sliding_window_view(rows, size, axis=1).max(axis=-1)
 
 
 def _cores(problem: Problem, lattice: Lattice) -> tuple[Core, Core]:
@@ -96,8 +110,8 @@ def _horizon(problem: Problem, lattice: Lattice, u: Array, core: Core) -> float:
 def _repair_factors(found: Needs) -> Array:
     """Factors (ny, nx) of lengths at the nodes that bring the norm of cells down."""
     excess = np.where(found.likely > TOLERATED, found.slope / TOLERATED, 1.0)
-    at_nodes = maximum_filter(np.pad(excess, ((0, 1), (0, 1)), mode="edge"), size=2)
-    return np.asarray(1.0 / maximum_filter(at_nodes, size=2 * REACH + 1))
+    at_nodes = _windows(np.pad(excess, 1, mode="edge"), 2)
+    return np.asarray(1.0 / _largest_within(at_nodes, REACH))
 
 
 class Search:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.ndimage
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -273,20 +272,22 @@ def _inflated_mask(mask: Mask, radius: float, bounds: Bounds) -> Mask:
     if not mask.blocked.any():
         return mask
     dx, dy = mask.spacing
+    from scipy import ndimage
+
     x, (left, right) = _widened(mask.x, dx, radius, bounds.x1_min, bounds.x1_max)
     y, (below, above) = _widened(mask.y, dy, radius, bounds.x2_min, bounds.x2_max)
     blocked = np.pad(mask.blocked, ((below, above), (left, right)))
     largest = float(np.abs([*bounds, x[0], x[-1], y[0], y[-1]]).max())
     limit = radius - CELL_DOUBT * min(dx, dy) + ROUNDING * largest
     # With its neighbours blocked, too, the distance between centres is that of rectangles.
-    touching = scipy.ndimage.binary_dilation(blocked, np.ones((3, 3), np.bool_))
+    touching = ndimage.binary_dilation(blocked, np.ones((3, 3), np.bool_))
     halo = math.ceil(min(radius / dy, len(y))) + 1
     rows = max(MOST_CELLS_AT_ONCE // len(x), 2 * halo, 1)
     for first in range(0, len(y), rows):
         low, high = max(first - halo, 0), min(first + rows + halo, len(y))
         if not touching[low:high].any():
             continue
-        gaps = scipy.ndimage.distance_transform_edt(~touching[low:high], sampling=(dy, dx))
+        gaps = ndimage.distance_transform_edt(~touching[low:high], sampling=(dy, dx))
         blocked[first : first + rows] = gaps[first - low :][:rows] < limit
     return Mask(blocked | np.pad(mask.blocked, ((below, above), (left, right))), x, y)
 

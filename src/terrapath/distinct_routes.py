@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import shapely
-from scipy.ndimage import minimum_filter
 
 from .eikonal import DistanceField, Medium, march_from
 from .lattice import Lattice, default_spacing
@@ -109,6 +108,8 @@ def _away_from(path: Path, points: Array, radius: float) -> Array:
 
 def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:
     """Nodes (m, 2) where the detour is least in a neighbourhood, by rising detour."""
+    from scipy.ndimage import minimum_filter
+
     size = (2 * math.ceil(radius / lattice.dy) + 1, 2 * math.ceil(radius / lattice.dx) + 1)
     least = minimum_filter(detours, size=size, mode="nearest")
     longest = LONGEST * float(detours.min())

@@ -132,6 +132,8 @@ def _edges(geometries: Geometries) -> Array:
 def _lists(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
     """Which items each cell of the grid holds: (first, ids) as in ``Space``."""
     counts = np.zeros(grid.nx * grid.ny + 1, np.int64)
+    if len(items) == 0:  # the kernel need not even be compiled
+        return counts, np.empty(0, np.int64)
     lister(grid, items, counts, np.empty(0, np.int64))
     first = np.cumsum(counts)
     ids = np.empty(first[-1], np.int64)
@@ -191,6 +193,10 @@ class FreeSpace:
         """What makes a point not free, in words; None where it is free."""
         if not self.bounds.contains(np.array(point)):
             return f"outside the bounds {self.bounds}"
+        return self._obstacle_at(point) if self.has_obstacles else None
+
+    def _obstacle_at(self, point: tuple[float, float]) -> str | None:
+        """What obstacle makes a point not free, in words."""
         masks = range(len(self.masks))
         if any(kernels.mask_is_hit(self.data, mask, *point, *point) for mask in masks):
             return "in a blocked or no-data cell"
@@ -212,6 +218,8 @@ class FreeSpace:
         start, end = as_array(a, "a", shape=(None, 2)), as_array(b, "b", shape=(None, 2))
         if len(start) != len(end):
             raise InputError(f"a has {len(start)} points and b {len(end)}; give as many of both")
+        if not self.has_obstacles:
+            return np.ones(len(start), bool)
         free = np.empty(len(start), np.uint8)
         kernels.fill_free(self.data, start, end, free)
         return free.astype(bool)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from ._kernels import geodesics as kernels
 from .errors import InputError
@@ -95,6 +94,8 @@ class Ray:
     @property
     def position(self) -> Callable[[Any], Array]:
         """Position by arc length between the steps (cubic Hermite)."""
+        from scipy.interpolate import CubicHermiteSpline
+
         curve: Callable[[Any], Array] = CubicHermiteSpline(
             self.arc_length, self.points, self.velocities
         )
@@ -103,6 +104,8 @@ class Ray:
     @property
     def conjugate_points(self) -> Array:
         """Arc lengths at which the end is conjugate to the start: j = 0 again."""
+        from scipy.interpolate import CubicHermiteSpline
+
         curve = CubicHermiteSpline(self.arc_length, self.jacobi, self.jacobi_slope)
         roots = curve.roots(extrapolate=False)
         return np.asarray(roots[roots > 1e-9 * self.length])
@@ -142,7 +145,7 @@ def trace_ray(
     while True:
         count, ended = kernels.trace(
             surface.data,
-            kernels.DORMAND_PRINCE,
+            kernels.dormand_prince(),
             edges,
             x,
             y,

@@ -13,7 +13,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-import scipy.ndimage
 import shapely
 
 from ._kernels import free_space as kernels
@@ -129,7 +128,9 @@ class _Window:
         """
         if not self.blocked.any():
             return False
-        parts, _ = scipy.ndimage.label(~self.blocked)
+        from scipy import ndimage
+
+        parts, _ = ndimage.label(~self.blocked)
         part_of_a, part_of_b = (parts[self.y.cell(y), self.x.cell(x)] for x, y in (a, b))
         # A free point lies in no blocked cell, 0, unless rounding says so.
         return bool(part_of_a != part_of_b and part_of_a > 0 and part_of_b > 0)
@@ -165,7 +166,9 @@ def _joined_on_lattice(bounds: Bounds, space: kernels.Space, a: Point, b: Point)
     picture[::2, ::2] = True
     picture[::2, 1::2] = _are_free(space, nodes[:, :-1], nodes[:, 1:])
     picture[1::2, ::2] = _are_free(space, nodes[:-1], nodes[1:])
-    parts, _ = scipy.ndimage.label(picture)
+    from scipy import ndimage
+
+    parts, _ = ndimage.label(picture)
     reached = []
     for x, y in (a, b):
         i = min(int((x - bounds.x1_min) / lattice.dx), lattice.nx - 2)

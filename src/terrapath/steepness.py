@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import scipy.ndimage
 
 from ._kernels.surfaces import Spline
 from .errors import InputError
@@ -79,7 +78,9 @@ class Steepness:
         georeference = self.surface.georeference
         if georeference is not None and not georeference.is_map_crs:
             # The map's own cells lie across these.
-            steep = scipy.ndimage.binary_dilation(steep, np.ones((3, 3), np.bool_))
+            from scipy import ndimage
+
+            steep = ndimage.binary_dilation(steep, np.ones((3, 3), np.bool_))
         if nodata is not None and _on_same_grid(nodata, x, y):
             steep &= ~nodata.blocked
             x, y = nodata.x, nodata.y

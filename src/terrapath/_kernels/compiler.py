@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+import gc
 import hashlib
-from collections.abc import Callable
-from functools import wraps
+import logging
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache, cached_property, wraps
 from pathlib import Path
 from typing import Any
 
+from numba import __version__ as numba_version
 from numba import config, njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.extending import overload
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompileResult
+from numba.core.registry import CPUDispatcher
+from numba.core.typing.templates import AbstractTemplate, infer_global
 
 Kernel = Callable[..., Any]
+
+# Tells of each kernel that is compiled, for it was not found in the cache.
+_LOG = logging.getLogger("terrapath.kernels")
 
 
 def _package_stamp() -> str:
@@ -26,16 +37,136 @@ def _package_stamp() -> str:
 _STAMP = _package_stamp()
 
 
-class _PackageCache(FunctionCache):
+class _CacheFile(IndexDataCacheFile):
+    """Numba's, safe for several processes that compile at once.
+
+    Numba numbers the files of a kernel's machine code, so that two processes that compile it
+    for different types can write to the same one. Here a file is named after what it is of,
+    and written before the index tells of it; at worst an entry is lost, and compiled again.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        digest = hashlib.sha256(self._dump((self._source_stamp, key))).hexdigest()[:16]
+        name = f"{self._index_name.removesuffix('.nbi')}.{digest}.nbc"
+        self._save_data(name, data)
+        self._save_index({**self._load_index(), key: name})
+
+
+class _PackageCache:
     """Numba's on-disk cache, made stale by a change in *any* kernel module.
 
     Numba alone looks only at the file that defines a function, so an edited callee
-    in another module would leave its callers running old code.
+    in another module would leave its callers running old code. The cache is looked for at the
+    first call from Python, which most kernels never get.
     """
 
     def __init__(self, function: Kernel) -> None:
-        super().__init__(function)
-        self._cache_file = IndexDataCacheFile(self.cache_path, self._impl.filename_base, _STAMP)
+        self._function = function
+
+    @cached_property
+    def _cache(self) -> FunctionCache:
+        found = FunctionCache(self._function)
+        found._cache_file = _CacheFile(found.cache_path, found._impl.filename_base, _STAMP)
+        return found
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._cache, name)
+
+
+# Kernels that other kernels call
+#
+# Numba makes machine code of every function that a compiled one calls, optimised together with
+# all that it calls in turn: what lies at the bottom of six calls is optimised seven times, and
+# nobody ever runs six of them. So a kernel has two sides here. Python calls the dispatcher,
+# which makes machine code and keeps it on disk; kernels call its ``_Part``, which stops at
+# LLVM's intermediate code. That is optimised once, in the machine code of who calls it.
+
+
+class _Library(JITCodeLibrary):
+    """Machine code of a kernel, with the parts that it calls directly or through others."""
+
+    def add_linking_library(self, library: Any) -> None:
+        super().add_linking_library(library)
+        # Callers before what they call: LLVM links what something refers to already.
+        if isinstance(library, _PartLibrary):
+            self._linking_libraries.extend(library._linking_libraries)
+
+    def _optimize_final_module(self) -> None:
+        """All passes at once; Numba's own, cheap ones before them are for counted references."""
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
+
+class _PartLibrary(_Library):
+    """Intermediate code alone: it is linked and optimised where a kernel calls it."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Only what is needed to link: all is optimised later."""
+        ll_module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        self._raise_if_finalized()
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _KernelCompiler(Compiler):
+    """What makes a kernel that Python calls."""
+
+    def compile_extra(self, function: Kernel) -> CompileResult:
+        _LOG.info("compiling %s", function.__qualname__)
+        self.state.library = _Library(self.state.targetctx.codegen(), function.__qualname__)
+        self.state.library.enable_object_caching()
+        with _garbage_left():
+            return super().compile_extra(function)
+
+
+@contextmanager
+def _garbage_left() -> Iterator[None]:
+    """No look for garbage meanwhile: a compiler makes many objects, and a quarter longer so."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+class _PartCompiler(Compiler):
+    """What makes a kernel that kernels call."""
+
+    def compile_extra(self, function: Kernel) -> CompileResult:
+        library = _PartLibrary(self.state.targetctx.codegen(), function.__qualname__)
+        self.state.library = library
+        self.state.flags.no_compile = True
+        result = super().compile_extra(function)
+        library.finalize()
+        # Callers find it by its entry point, which here is nothing that can be called.
+        self.state.targetctx.insert_user_function(library, result.fndesc, [library])
+        return result._replace(entry_point=library)
+
+
+def _settled(kind: types.Type) -> types.Type:
+    """One type for all integers, whatever their width and even where their value is known.
+
+    Each combination of types would be compiled apart.
+    """
+    kind = types.unliteral(kind)
+    if isinstance(kind, types.Integer) and kind.signed:
+        return types.intp
+    return kind
+
+
+class _Part(CPUDispatcher):
+    """The side of a kernel that other kernels call."""
+
+    def get_call_template(self, args: tuple[types.Type, ...], kws: Any) -> Any:
+        return super().get_call_template(tuple(map(_settled, args)), kws)
+
+    def add_overload(self, result: CompileResult) -> None:
+        self.overloads[tuple(result.signature.args)] = result
 
 
 _kernels: list[Any] = []
@@ -53,8 +184,18 @@ def _compile(function: Kernel, *, inline: bool = False, allocates: bool = False)
         forceinline=inline,
         no_cfunc_wrapper=True,
         _nrt=allocates,
+        pipeline_class=_KernelCompiler,
     )(function)
     dispatcher._cache = _PackageCache(function)
+
+    @cache
+    def part() -> _Part:
+        options = {**dispatcher.targetoptions, "no_cpython_wrapper": True}
+        return _Part(function, targetoptions=options, pipeline_class=_PartCompiler)
+
+    dispatcher.get_call_template = lambda args, kws: part().get_call_template(args, kws)
+    dispatcher.get_overload = lambda sig: part().get_overload(sig)
+    dispatcher.part = part
     _kernels.append(dispatcher)
     return dispatcher
 
@@ -89,38 +230,67 @@ def cache_statistics() -> dict[str, int]:
     return {"loaded": hits, "compiled": misses}
 
 
-_DISPATCH = """
-def generic({arguments}):
-    return implementations[type({surface})]({arguments})
+def cache_directory() -> Path | None:
+    """Where compiled kernels are kept; None where none are compiled."""
+    return Path(_kernels[0].stats.cache_path) if _kernels else None
 
-def resolve({arguments}):
-    implementation = select({surface})
-    if implementation is None:
-        return None
-    return lambda {arguments}: implementation({arguments})
+
+def cached_files() -> list[str]:
+    """Names of the files in the cache that hold these very kernels."""
+    names = []
+    for dispatcher in _kernels:
+        file = dispatcher._cache._cache_file
+        machine_code = file._load_index().values()
+        names += [file._index_name, *machine_code] if machine_code else []
+    return sorted(names)
+
+
+def cache_key() -> str:
+    """What machine code depends on: the kernels, the compiler, Python and the processor."""
+    target = CPUDispatcher.targetdescr.target_context.codegen().magic_tuple()
+    return "; ".join([_STAMP, numba_version, platform.python_version(), *map(str, target)])
+
+
+_DISPATCH = """
+def dispatch({arguments}):
+    return implementations[type({surface})]({arguments})
 """
 
 
 def per_class(implementations: dict[type, Kernel]) -> Callable[[Kernel], Kernel]:
     """Turn a declaration ``f(surface, ...)`` into dispatch on the surface's class.
 
-    Compiled callers resolve it at compile time through ``overload``; plain Python
-    looks the class up. A surface is a ``NamedTuple`` of arrays and never a callback,
+    Compiled callers resolve it at compile time, and call the implementation itself; plain
+    Python looks the class up. A surface is a ``NamedTuple`` of arrays and never a callback,
     which is what lets a compiled planner be found in the cache by the next process.
     """
 
-    def select(surface: types.Type) -> Kernel | None:
+    def select(surface: types.Type) -> types.Dispatcher | None:
         # A one-field tuple is typed as a NamedUniTuple, so match on the common base.
-        if isinstance(surface, types.BaseNamedTuple):
-            return implementations.get(surface.instance_class)
-        return None
+        if not isinstance(surface, types.BaseNamedTuple):
+            return None
+        implementation = implementations.get(surface.instance_class)
+        return None if implementation is None else types.Dispatcher(implementation)
 
     def declare(declaration: Kernel) -> Kernel:
         names = declaration.__code__.co_varnames[: declaration.__code__.co_argcount]
-        scope: dict[str, Any] = {"select": select, "implementations": implementations}
+        scope: dict[str, Any] = {"implementations": implementations}
         exec(_DISPATCH.format(arguments=", ".join(names), surface=names[0]), scope)
-        generic: Kernel = wraps(declaration)(scope["generic"])
-        overload(generic, jit_options={"forceinline": True, "_nrt": False})(scope["resolve"])
-        return generic
+        dispatch: Kernel = wraps(declaration)(scope["dispatch"])
+
+        class Dispatch(AbstractTemplate):
+            key = dispatch
+
+            def generic(self, args: tuple[types.Type, ...], kws: Any) -> Any:
+                chosen = select(args[0])
+                return None if chosen is None else chosen.get_call_type(self.context, args, kws)
+
+            def get_impl_key(self, signature: Any) -> Any:
+                chosen = select(signature.args[0])
+                return None if chosen is None else chosen.get_impl_key(signature)
+
+        if not config.DISABLE_JIT:
+            infer_global(dispatch, types.Function(Dispatch))
+        return dispatch
 
     return declare

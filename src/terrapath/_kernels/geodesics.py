@@ -7,10 +7,10 @@ is 0 again the end is conjugate to the start.
 """
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from .compiler import allocating_kernel, inner_kernel, kernel
 from .lengths import norm
@@ -175,7 +175,13 @@ class Tableau(NamedTuple):
     e5: np.ndarray
 
 
-DORMAND_PRINCE = Tableau(*map(np.ascontiguousarray, (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5)))
+@cache
+def dormand_prince():
+    """The tableau of order 8; SciPy's, which takes long to import."""
+    from scipy.integrate import DOP853
+
+    return Tableau(*map(np.ascontiguousarray, (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5)))
+
 
 _SAFETY, _LEAST_FACTOR, _MOST_FACTOR = 0.9, 0.2, 6.0
 

@@ -16,7 +16,8 @@ def benchmark_command(
     what: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[WHAT]...", help="Some of bound, fast-marching, path and large-maps."
+            metavar="[WHAT]...",
+            help="Some of bound, fast-marching, path, large-maps and startup.",
         ),
     ] = None,
     quick: Annotated[
@@ -28,7 +29,7 @@ def benchmark_command(
     ] = Path("benchmark"),
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
 ) -> int:
-    """Measure bounds, fast marching, paths and large maps: the clock, the truth and the peers.
+    """Measure bounds, fast marching, paths, large maps and start-up: clock, truth and peers.
 
     Peers that are not installed are named and left out. A run that was stopped goes on where
     it was when the same command is given again. Nothing else should run on the machine.

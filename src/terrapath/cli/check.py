@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError, MapError
+from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .question import Question, scenario_of
@@ -65,9 +66,10 @@ def check_command(
     """
     question = Question(scenario_of(where, given))
     loaded = _load(certificate)
-    problem = _leg(question.itinerary(), leg)
-    started = time.perf_counter()
-    loaded.check(problem)
+    with compiling_told():
+        problem = _leg(question.itinerary(), leg)
+        started = time.perf_counter()
+        loaded.check(problem)
     seconds = time.perf_counter() - started
     from .report import print_check
 

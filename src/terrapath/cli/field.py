@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
+from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .outputs import require_outputs
@@ -81,9 +82,10 @@ def field_command(
     from ..eikonal import field_of
     from .report import print_field
 
-    problem = Question(scenario).problem_to_itself()
-    started = time.perf_counter()
-    field = field_of(problem, spacing=scenario.planner.spacing)
+    with compiling_told():
+        problem = Question(scenario).problem_to_itself()
+        started = time.perf_counter()
+        field = field_of(problem, spacing=scenario.planner.spacing)
     print_field(problem, field, time.perf_counter() - started)
     outputs.write(field)
     return ExitCode.SOLVED

@@ -19,6 +19,7 @@ from .remarks import remark, remarks
 from .reproduce import reproduce_command
 from .scenes import scenes_command
 from .schema import schema_command
+from .warmup import warmup_command
 
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
 # its usage errors is reached through the one it exports.
@@ -40,6 +41,7 @@ app.command("schema")(schema_command)
 app.command("scenes")(scenes_command)
 app.command("reproduce")(reproduce_command)
 app.command("benchmark")(benchmark_command)
+app.command("warmup")(warmup_command)
 
 
 def _show_version(wanted: bool) -> None:

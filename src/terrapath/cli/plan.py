@@ -10,6 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..options import Point, Scenario
+from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .outputs import RouteOutputs
@@ -143,12 +144,13 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
     outputs = RouteOutputs(output, len(route.via) + 1)
     outputs.check()
     question, quiet = Question(scenario), output.quiet or output.json
-    if is_planned_in_corridor(scenario, cells := question.cells()):
-        answer = _solve_in_corridor(planner, question, cells, outputs, quiet)
-    else:
-        itinerary = question.itinerary()
-        outputs.require_fit(itinerary.problem)
-        answer = _solve(planner, itinerary, route.all_goals, quiet)
+    with compiling_told(quiet):
+        if is_planned_in_corridor(scenario, cells := question.cells()):
+            answer = _solve_in_corridor(planner, question, cells, outputs, quiet)
+        else:
+            itinerary = question.itinerary()
+            outputs.require_fit(itinerary.problem)
+            answer = _solve(planner, itinerary, route.all_goals, quiet)
     # Shown before it is written, so that a full disk loses no answer.
     _print(answer, scenario)
     if answer.solution.path is not None:

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from .._kernels import refinement as kernels
 from ..surface import Surface
@@ -98,6 +97,8 @@ def adopted(around: Surroundings, band: Band) -> Band:
     """With the points held that lie at corners."""
     if len(around.corners) == 0:
         return band
+    from scipy.spatial import cKDTree
+
     reach = AT_CORNER * float(around.clearance.min())
     distance, nearest = cKDTree(around.corners).query(band.points, distance_upper_bound=reach)
     found = np.isfinite(distance) & (band.bends == NONE)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from .._kernels import refinement as kernels
 from .._kernels.surfaces import fill_jets, fill_log_costs
@@ -177,6 +176,8 @@ def settle(surface: Surface, points: Array) -> Array:
 
 def resample(points: Array, pieces: int) -> Array:
     """As many pieces, equal in the curve's parameter, of the smooth curve through the points."""
+    from scipy.interpolate import make_interp_spline
+
     shares = np.linspace(0.0, 1.0, len(points))
     curve = make_interp_spline(shares, points, k=min(3, len(points) - 1))
     return np.ascontiguousarray(curve(np.linspace(0.0, 1.0, pieces + 1)))

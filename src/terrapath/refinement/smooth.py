@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from .._kernels.surfaces import fill_metric
 from ..surface import Surface
@@ -87,6 +86,8 @@ def correct(surface: Surface, points: Array) -> Array | None:
 
 def curve_through(points: Array) -> Curve:
     """The smooth curve through vertices (m, 2), as a function of the share of the way."""
+    from scipy.interpolate import make_interp_spline
+
     pieces = len(points) - 1
     shares = np.linspace(0.0, 1.0, pieces + 1)
     curve: Curve = make_interp_spline(shares, points, k=5 if pieces > 5 else min(3, pieces))

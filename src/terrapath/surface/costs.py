@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from .._kernels.surfaces import Spline
 from ..errors import InputError
@@ -39,6 +38,8 @@ def limited(logs: Spline) -> Spline:
     so makes ground cheap that is not. Its coefficients are kept within the values of the 3 x 3
     nodes around each; on smooth ground off the extremes they are there anyway.
     """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
     values = _at_knots(logs.coefficients)
     around = np.pad(values, ((0, 0), (1, 1), (1, 1)), mode="edge")
     low = minimum_filter(around, size=(1, 3, 3), mode="nearest")

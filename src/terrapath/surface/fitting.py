@@ -7,9 +7,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.linalg import solveh_banded
-from scipy.stats import qmc
 
 from .._kernels.surfaces import Spline, fill_jets, fill_values
 from ..errors import FitError, InputError
@@ -65,6 +62,8 @@ def _curvatures(f: Array) -> Array:
     At inner knots m_(j-1) + 4 m_j + m_(j+1) = 6 (f_(j-1) - 2 f_j + f_(j+1)). With not-a-knot
     ends m_0 = 2 m_1 - m_2, which makes m_1 the second difference itself, and so at the end.
     """
+    from scipy.linalg import solveh_banded
+
     m = np.empty(f.shape, order="F")
     inner = m[1:-1]
     np.subtract(f[2:], f[1:-1], out=inner)
@@ -135,6 +134,8 @@ def _resample(values: Array, x: Array, axis: int) -> tuple[Array, Array]:
             f"the grid's steps differ by a factor of over {MOST_RESAMPLING} "
             f"({np.diff(x).min():g} to {np.diff(x).max():g}); resample it to equal steps first"
         )
+    from scipy.interpolate import CubicSpline
+
     uniform = np.linspace(x[0], x[-1], count)
     return CubicSpline(x, values, axis=axis)(uniform), uniform
 
@@ -244,6 +245,8 @@ def _exact_gradient(gradient: Gradient, layers: int) -> Gradient:
 
 def _test_points(bounds: Bounds, margin: float) -> tuple[Array, Array]:
     """Points off every grid (Sobol, scrambled, seed 0) inside a margin, some on its edges."""
+    from scipy.stats import qmc
+
     u, v = qmc.Sobol(2, seed=0).random(TEST_POINTS).T
     edge = TEST_POINTS // 32  # points on each edge, where splines are at their worst
     u[:edge], u[edge : 2 * edge] = 0.0, 1.0

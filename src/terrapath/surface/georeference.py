@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pyproj import CRS, Proj, Transformer
-from pyproj.crs import ProjectedCRS
-from pyproj.crs.coordinate_operation import TransverseMercatorConversion
-from pyproj.exceptions import CRSError, ProjError
 
 from ..errors import MapError
 from ..validation import Array, Bounds
+
+if TYPE_CHECKING:
+    from pyproj import CRS, Transformer
 
 # Of lengths, as CRSs and maps write them: metres each.
 LENGTH_UNITS = {
@@ -41,6 +40,9 @@ def parse_crs(text: Any, name: str = "the CRS") -> CRS | None:
 
     Of a compound CRS the horizontal part, of a bound one its source. Raises MapError.
     """
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError, ProjError
+
     if text is None:
         return None
     try:
@@ -71,6 +73,9 @@ def parse_crs(text: Any, name: str = "the CRS") -> CRS | None:
 @cache
 def transformer(source: CRS, target: CRS) -> Transformer:
     """From one CRS to another, x (longitude) first. Raises MapError where there is no way."""
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
     try:
         return Transformer.from_crs(source, target, always_xy=True)
     except ProjError as error:
@@ -86,6 +91,8 @@ def worst_scale(crs: CRS, x: Array, y: Array) -> float:
 
     Infinite where the projection does not reach the points.
     """
+    from pyproj import Proj
+
     assert crs.geodetic_crs is not None
     lonlat = transformer(crs, crs.geodetic_crs).transform(x, y)
     factors = Proj(crs).get_factors(*lonlat, errcheck=False)
@@ -99,6 +106,9 @@ def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
     Conformal, so directions and slopes are right, and unlike UTM without a scale factor:
     30 km from the centre lengths are off by 1e-5. The datum stays the map's own.
     """
+    from pyproj.crs import ProjectedCRS
+    from pyproj.crs.coordinate_operation import TransverseMercatorConversion
+
     centre = TransverseMercatorConversion(round(latitude, 6), round(longitude, 6))
     return ProjectedCRS(centre, name="local transverse Mercator", geodetic_crs=map_crs)
 
@@ -113,6 +123,9 @@ class Georeference:
     @classmethod
     def from_projected(cls, crs: Any) -> Georeference:
         """A map that is planned in its own, projected CRS."""
+        from pyproj import CRS
+        from pyproj.exceptions import CRSError
+
         try:
             parsed = CRS.from_user_input(crs)
         except CRSError as error:
@@ -150,10 +163,14 @@ class Georeference:
 
     @cached_property
     def _to_map(self) -> Transformer:
+        from pyproj import Transformer
+
         return Transformer.from_crs(self.crs, self.map_crs, always_xy=True)
 
     @cached_property
     def _to_lonlat(self) -> Transformer:
+        from pyproj import CRS, Transformer
+
         target = CRS.from_epsg(4326) if self.is_earth else self.crs.geodetic_crs
         return Transformer.from_crs(self.crs, target, always_xy=True)
 

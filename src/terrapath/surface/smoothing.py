@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import dst, idst
 
 from ..errors import InputError
 from ..validation import Array, Bounds, require_not_negative
@@ -130,6 +129,8 @@ def _smooth_lines(f: Array, scale: float) -> Array:
     by odd reflection: f(end + t) = 2 f(end) - f(end - t). Any scale is exact, also one below
     the spacing.
     """
+    from scipy.fft import dst, idst
+
     count = f.shape[-1]
     line = f[..., :1] + (f[..., -1:] - f[..., :1]) * np.linspace(0.0, 1.0, count)
     frequencies = np.pi * np.arange(1, count - 1) / (count - 1)

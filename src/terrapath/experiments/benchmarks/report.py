@@ -14,6 +14,7 @@ from .marching import REFERENCE_ERRORS, MarchData, MarchRow
 from .paths import NEAR, PathsData, PathsFound
 from .peers import SCIKIT_FMM
 from .settings import FULL, QUICK, Scale
+from .startup import StartData
 from .timing import Target, Timing, percent
 
 
@@ -177,6 +178,25 @@ def large_maps_lines(data: LargeMapData) -> list[str]:
         "own, warm; memory is its peak.",
         "",
         *markdown_table(header, rows),
+    ]
+
+
+def startup_lines(data: StartData) -> list[str]:
+    """Each command."""
+    rows = [
+        [
+            runs.label,
+            _seconds(found.timing),
+            f"{median(found.timing.wall):.3f}",
+            f"{median(found.timing.processor):.3f}",
+        ]
+        for runs, found in data.found
+    ]
+    return [
+        "Whole processes, from their start to their end. Cold: the cache of compiled kernels is "
+        "empty, as at the first run after an installation; Python's own cache is not.",
+        "",
+        *markdown_table(["command", "seconds", "wall time", "processor time"], rows),
     ]
 
 

@@ -15,7 +15,7 @@ from ..report import processor
 from ..reproduce import REPORT_FILE, TRIALS, claim
 from ..runner import Runner, Watch, watch_nothing
 from ..trials import Store
-from . import bound, figures, large_maps, marching, paths, report
+from . import bound, figures, large_maps, marching, paths, report, startup
 from .settings import FULL, QUICK, Scale
 from .timing import Target, Timing, percent
 
@@ -73,6 +73,14 @@ EXPERIMENTS = {
         large_maps.large_maps_targets,
         report.large_maps_lines,
         lambda data: [found.timing for found in data.found.values()],
+        lambda data, directory: [],
+    ),
+    "startup": Experiment(
+        "Start-up: from the prompt to the answer",
+        startup.run_startup,
+        startup.startup_targets,
+        report.startup_lines,
+        lambda data: [found.timing for _, found in data.found],
         lambda data, directory: [],
     ),
 }

@@ -28,6 +28,8 @@ class Scale:
     slow_repeats: int = 3  # of planners that take seconds, or that chance has a part in
     tree_samples: tuple[int, ...] = (3_000, 10_000, 30_000)
     most_samples: int = 100_000
+    warm_starts: int = 9
+    cold_starts: int = 3
 
 
 FULL = Scale()
@@ -39,6 +41,8 @@ QUICK = Scale(
     path_repeats=3,
     slow_repeats=1,
     tree_samples=(3_000, 10_000),
+    warm_starts=3,
+    cold_starts=1,
 )
 
 

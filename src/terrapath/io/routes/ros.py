@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...errors import MapError
 from ...problem import Path as Route
@@ -49,6 +48,8 @@ def orientations(route: Route) -> Array:
     ahead = headings(route.profile.points)
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
     pitch = -np.radians(slopes(route).along)
+    from scipy.spatial.transform import Rotation
+
     turned = Rotation.from_euler("ZY", np.column_stack([yaw, pitch]))
     return np.asarray(turned.as_quat(canonical=True))
 

@@ -1,0 +1,233 @@
+"""The first run: what is compiled, what is said of it, and `terrapath warmup`."""
+
+import logging
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from processes import in_another_process
+from terrapath import warmup
+from terrapath._kernels import compiler
+from terrapath.cli import compiling
+from terrapath.cli.main import run
+from terrapath.errors import InputError
+from terrapath.surface import Surface
+
+# What is said
+
+
+class Terminal:
+    """Standard error with somebody watching."""
+
+    def __init__(self, watched=True):
+        self.text, self.watched = "", watched
+
+    def isatty(self):
+        return self.watched
+
+    def write(self, text):
+        self.text += text
+
+    def flush(self):
+        pass
+
+
+def compile_two():
+    for name in ("grow", "march"):
+        logging.getLogger(compiling.LOGGER).info("compiling %s", name)
+
+
+@pytest.mark.parametrize(
+    ("quiet", "watched", "work", "lines"),
+    [
+        (False, True, compile_two, 1),
+        (True, True, compile_two, 0),
+        (False, False, compile_two, 0),
+        (False, True, lambda: None, 0),
+    ],
+)
+def test_compiling_is_told_once_where_it_happens_and_somebody_watches(
+    quiet, watched, work, lines, monkeypatch
+):
+    terminal = Terminal(watched)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with compiling.compiling_told(quiet):
+        work()
+    compile_two()  # which is nobody's business any more
+    assert terminal.text.count("compiling kernels, once") == lines
+    assert len(terminal.text.splitlines()) == lines
+    assert not logging.getLogger(compiling.LOGGER).handlers
+
+
+CALLEE = "from .compiler import kernel\n\n@kernel\ndef callee(x, n):\n    return x * (n + 1)\n"
+CALLER = (
+    "import numpy as np\nfrom .callee import callee\nfrom .compiler import kernel\n\n"
+    "@kernel\ndef caller(x, n):\n    return callee(x, 2) + callee(x, n) + callee(x, np.int32(n))\n"
+)
+CALL = (
+    "import json, logging, sys; sys.path.insert(0, {!r})\n"
+    "told = []\n"
+    "class Listener(logging.Handler):\n"
+    "    def emit(self, record): told.append(record.getMessage())\n"
+    "logger = logging.getLogger({!r}); logger.setLevel('INFO'); logger.addHandler(Listener())\n"
+    "from copied.caller import caller; from copied.callee import callee\n"
+    "from copied import compiler\n"
+    "first = caller(1.0, 3); told_first = list(told); second = callee(1.0, 3)\n"
+    "parts = len(callee.part().overloads)\n"
+    "print(json.dumps([first, second, told_first, told, parts, len(compiler.cached_files())]))"
+)
+
+
+@pytest.fixture
+def call(tmp_path):
+    """A package of two kernels, one of which calls the other, in processes that share a cache."""
+    package = tmp_path / "copied"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    shutil.copy(compiler.__file__, package)
+    (package / "callee.py").write_text(CALLEE)
+    (package / "caller.py").write_text(CALLER)
+    code = CALL.format(str(tmp_path), compiling.LOGGER)
+    return lambda: in_another_process(code, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+
+
+def test_a_kernel_that_kernels_call_is_compiled_by_itself_only_for_python(call):
+    first, second, told_first, told, parts, files = call()
+    assert (first, second) == (11.0, 4.0)
+    assert told_first == ["compiling caller"]
+    assert told == ["compiling caller", "compiling callee"]
+    assert parts == 1  # one for integers of all widths
+    assert files == 4  # an index and machine code of each
+    first, second, told_first, told, parts, files = call()
+    assert (first, second, told, parts, files) == (11.0, 4.0, [], 0, 4)
+
+
+def test_processes_that_compile_at_once_do_not_write_to_the_same_file(tmp_path):
+    files = [compiler._CacheFile(str(tmp_path), "kernel-1", "stamp") for _ in range(2)]
+    # Both have read the index before either writes it.
+    for file in files:
+        file._load_index = dict
+    for file, key in zip(files, ("float", "int"), strict=True):
+        file.save(key, f"code for {key}")
+    fresh = compiler._CacheFile(str(tmp_path), "kernel-1", "stamp")
+    assert fresh.load("int") == "code for int"
+    assert fresh.load("float") is None  # lost, and so compiled again; not the other's code
+    fresh.save("float", "code for float")
+    assert [fresh.load(key) for key in ("float", "int")] == ["code for float", "code for int"]
+    assert compiler._CacheFile(str(tmp_path), "kernel-1", "other").load("int") is None
+
+
+# terrapath warmup
+
+
+@pytest.fixture
+def kitchen(tmp_path, monkeypatch):
+    """Two rehearsals that write a file each; returns what was rehearsed."""
+    rehearsed = []
+
+    def rehearse(name):
+        rehearsed.append(name)
+        (tmp_path / f"{name}.nbc").write_bytes(bytes(1_000_000))
+
+    work = [warmup.Rehearsal(name, lambda name=name: rehearse(name)) for name in ("one", "two")]
+    monkeypatch.setattr(warmup, "rehearsals", lambda: work)
+    monkeypatch.setattr(compiler, "cache_directory", lambda: tmp_path)
+    monkeypatch.setattr(
+        compiler, "cached_files", lambda: sorted(path.name for path in tmp_path.glob("*.nbc"))
+    )
+    monkeypatch.setattr(
+        compiler, "cache_statistics", lambda: {"loaded": 0, "compiled": len(rehearsed)}
+    )
+    return rehearsed
+
+
+def test_warming_up_compiles_once_and_then_says_that_all_are_there(kitchen, tmp_path, capsys):
+    assert run(["warmup"]) == 0
+    assert kitchen == ["one", "two"]
+    said = capsys.readouterr()
+    assert "compiled 2 kernels" in said.out
+    assert f"2.0 MB in {tmp_path}" in said.out
+    assert said.err == ""
+    assert run(["warmup"]) == 0
+    assert kitchen == ["one", "two"]
+    assert "all kernels are there: 2.0 MB" in capsys.readouterr().out
+    assert run(["warmup", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_what_is_done_is_told(kitchen):
+    seen = []
+    warmup.warm_up(lambda *told: seen.append(told))
+    assert seen == [("one", 0, 2), ("two", 1, 2), ("compiled", 2, 2)]
+
+
+def spoil_list(folder):
+    (folder / warmup.LIST_FILE).write_text('{"key": 1')
+
+
+def spoil_content(folder):
+    (folder / warmup.LIST_FILE).write_text("[]")
+
+
+def lose_a_kernel(folder):
+    (folder / "one.nbc").unlink()
+
+
+@pytest.mark.parametrize("spoil", [spoil_list, spoil_content, lose_a_kernel])
+def test_a_cache_that_lacks_something_is_warmed_again(spoil, kitchen, tmp_path):
+    warmup.warm_up()
+    spoil(tmp_path)
+    assert warmup.warm_up().compiled == 2
+    assert kitchen == ["one", "two"] * 2
+    assert warmup.warm_up().compiled == 0
+
+
+def test_other_kernels_or_another_compiler_are_warmed_anew(kitchen, monkeypatch):
+    warmup.warm_up()
+    assert compiler._STAMP in compiler.cache_key()
+    monkeypatch.setattr(compiler, "cache_key", lambda: "another")
+    warmup.warm_up()
+    assert kitchen == ["one", "two"] * 2
+
+
+def test_an_interrupt_leaves_no_list(kitchen, tmp_path, monkeypatch):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(warmup, "rehearsals", lambda: [warmup.Rehearsal("stop", interrupt)])
+    assert run(["warmup"]) == 130
+    assert not (tmp_path / warmup.LIST_FILE).exists()
+
+
+def test_without_a_compiler_there_is_nothing_to_warm(monkeypatch, capsys):
+    monkeypatch.setattr(compiler, "_kernels", [])
+    assert compiler.cache_directory() is None
+    with pytest.raises(InputError, match="NUMBA_DISABLE_JIT is set"):
+        warmup.warm_up()
+    assert run(["warmup"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_both_classes_of_surface_are_rehearsed_by_every_kind_of_work():
+    classes = {type(make().data) for make in warmup.SURFACES.values()}
+    assert {kind.__name__ for kind in classes} == {"Peaks", "Spline"}
+    assert all(isinstance(make(), Surface) for make in warmup.SURFACES.values())
+    assert warmup.SURFACES["splines"]().least_cost != 1.0  # with costs
+    assert len(warmup.rehearsals()) == len(warmup.KINDS) * len(warmup.SURFACES)
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import json, sys; from terrapath.cli.main import run; run(['--help'])\n"
+        "sys.stdout.write('\\n'); print(json.dumps(sorted(sys.modules)))"
+    )
+    import json
+    import subprocess
+
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path.cwd()
+    )
+    modules = set(json.loads(done.stdout.splitlines()[-1]))
+    assert not modules & {"numpy", "numba", "scipy", "pydantic", "matplotlib", "rasterio", "rich"}
