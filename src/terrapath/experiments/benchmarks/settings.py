@@ -28,6 +28,25 @@ class Scale:
     slow_repeats: int = 3  # of planners that take seconds, or that chance has a part in
     tree_samples: tuple[int, ...] = (3_000, 10_000, 30_000)
     most_samples: int = 100_000
+    # Trees beside OMPL's.
+    tree_scenes: tuple[str, ...] = ("six-peaks", "three-peaks", "three-peaks-discs", "jacksboro")
+    tree_seeds: int = 20
+    few_tree_seeds: int = 5  # of OMPL's other planners through Python
+    sweep_seeds: int = 3  # of each choice of options
+    tree_looks: tuple[int, int] = (100, 50_000)  # samples: the first, the last
+    cpp_looks: tuple[float, float] = (0.005, 5.0)  # seconds
+    python_looks: tuple[float, float] = (0.1, 15.0)
+    optimum_gap: float = 1e-3  # to prove of the shortest paths that are not known
+    optimum_seconds: float = 60.0
+    # Lattices: nodes on a side of each.
+    grid_scenes: tuple[str, ...] = ("one-peak", "three-peaks", "four-peaks")
+    grid_nodes: tuple[int, ...] = (121, 241, 481, 961)
+    mesh_nodes: tuple[int, ...] = (121, 241)  # of exact geodesics
+    grid_repeats: int = 3
+    growth_samples: tuple[int, int] = (100_000, 1_000_000)
+    growth_repeats: int = 3
+    edges: int = 200_000
+    edge_repeats: int = 9
 
 
 FULL = Scale()
@@ -39,6 +58,21 @@ QUICK = Scale(
     path_repeats=3,
     slow_repeats=1,
     tree_samples=(3_000, 10_000),
+    tree_scenes=("six-peaks",),
+    tree_seeds=5,
+    few_tree_seeds=1,
+    sweep_seeds=1,
+    tree_looks=(100, 20_000),
+    cpp_looks=(0.01, 1.0),
+    python_looks=(0.1, 4.0),
+    grid_scenes=("three-peaks",),
+    grid_nodes=(121, 241),
+    mesh_nodes=(121,),
+    grid_repeats=1,
+    growth_samples=(20_000, 200_000),
+    growth_repeats=1,
+    edges=50_000,
+    edge_repeats=5,
 )
 
 

@@ -1,0 +1,32 @@
+"""Measures that need a process of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+from ...errors import TerrapathError
+
+# Numerical libraries would otherwise use every core.
+ONE_CORE = {
+    name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+}
+
+
+def run_fresh(module: str, task: dict[str, Any], what: str) -> Any:
+    """What ``python -m`` prints of a module of this package that is given a task, from JSON.
+
+    what : is said where it fails, in a TerrapathError. One core is used.
+    """
+    command = [sys.executable, "-m", f"{__package__}.{module}", json.dumps(task)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env={**os.environ, **ONE_CORE}
+    )
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or ["no message"]
+        raise TerrapathError(f"{what} ended with code {done.returncode}: {lines[-1]}")
+    # Libraries may greet first.
+    return json.loads(done.stdout.strip().splitlines()[-1])
