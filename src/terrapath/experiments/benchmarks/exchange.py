@@ -12,7 +12,8 @@ from ...errors import InputError
 from ...free_space import Circle
 from ...planners.tree_search import FEATURES_PER_PANEL
 from ...problem import Problem
-from ...validation import Array
+from ...surface.mask import Mask
+from ...validation import Array, Bounds
 
 PEAKS, SPLINE = 0.0, 1.0
 
@@ -22,12 +23,20 @@ def panel_of(problem: Problem) -> float:
     return FEATURES_PER_PANEL * problem.surface.resolution
 
 
+def _blocks(mask: Mask, bounds: Bounds) -> bool:
+    """Is a cell without data within the bounds, or at less than a cell from them?"""
+    dx, dy = mask.x[1] - mask.x[0], mask.y[1] - mask.y[0]
+    columns = (mask.x > bounds.x1_min - dx) & (mask.x < bounds.x1_max + dx)
+    rows = (mask.y > bounds.x2_min - dy) & (mask.y < bounds.x2_max + dy)
+    return bool(mask.blocked[np.ix_(rows, columns)].any())
+
+
 def discs_of(problem: Problem) -> Array:
     """The obstacles, (m, 3): centre and radius, map units. Raises InputError for all others."""
-    space = problem.surface.nodata
     others = [o for o in problem.obstacles if not isinstance(o, Circle)]
-    if others or space is not None or problem.max_slope is not None or problem.keep_in is not None:
-        raise InputError(f"{problem.name}: programs in C++ know no obstacles but discs")
+    nodata = problem.surface.nodata is not None and _blocks(problem.surface.nodata, problem.bounds)
+    if others or nodata or problem.max_slope is not None or problem.keep_in is not None:
+        raise InputError(f"{problem.name}: other programs are given no obstacles but discs")
     discs = [(o.x1, o.x2, o.radius + problem.radius) for o in problem.obstacles]  # type: ignore[union-attr]
     return np.array(discs, np.float64).reshape(-1, 3)
 

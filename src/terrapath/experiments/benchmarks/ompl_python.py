@@ -106,3 +106,113 @@ def _is_free(problem: Problem) -> Callable[[float, float, float, float], bool]:
         return True
 
     return free
+
+
+def _make_objective(space: Any, problem: Problem) -> Any:
+    from ompl import base
+
+    line_r = line_r_with_numpy(problem)
+
+    class LineRObjective(base.OptimizationObjective):  # type: ignore[misc]
+        def stateCost(self, state: Any) -> Any:  # noqa: N802
+            return base.Cost(0.0)
+
+        def motionCost(self, a: Any, b: Any) -> Any:  # noqa: N802
+            return base.Cost(line_r(a[0], a[1], b[0], b[1]))
+
+        def motionCostHeuristic(self, a: Any, b: Any) -> Any:  # noqa: N802
+            return base.Cost(math.hypot(b[0] - a[0], b[1] - a[1]))
+
+    return LineRObjective(space)
+
+
+def _make_space(problem: Problem) -> Any:
+    from ompl import base
+
+    free = _is_free(problem)
+
+    class DiscValidator(base.MotionValidator):  # type: ignore[misc]
+        def checkMotion(self, a: Any, b: Any, last: Any = None) -> bool:  # noqa: N802
+            return free(a[0], a[1], b[0], b[1])
+
+    plane = base.RealVectorStateSpace(2)
+    bounds, given = base.RealVectorBounds(2), problem.bounds
+    for k, (low, high) in enumerate(zip(given[:2], given[2:], strict=True)):
+        bounds.setLow(k, low)
+        bounds.setHigh(k, high)
+    plane.setBounds(bounds)
+    space = base.SpaceInformation(plane)
+    space.setStateValidityChecker(lambda state: free(state[0], state[1], state[0], state[1]))
+    if problem.obstacles:
+        space.setMotionValidator(DiscValidator(space))
+    space.setup()
+    return space
+
+
+def _make_definition(space: Any, problem: Problem) -> Any:
+    from ompl import base
+
+    definition = base.ProblemDefinition(space)
+    ends = []
+    for point in (problem.start, problem.goal):
+        state = space.allocState()
+        state[0], state[1] = point
+        ends.append(state)
+    definition.setStartAndGoalStates(*ends)
+    definition.setOptimizationObjective(_make_objective(space, problem))
+    return definition
+
+
+PLANNERS = {
+    "rrt-star": "RRTstar",
+    "informed-rrt-star": "InformedRRTstar",
+    "bit-star": "BITstar",
+}
+
+
+def _path(definition: Any) -> list[float]:
+    states = definition.getSolutionPath().getStates()
+    return [float(state[k]) for state in states for k in (0, 1)]
+
+
+def looks(problem: Problem, task: dict[str, Any]) -> list[dict[str, Any]]:
+    """Run the planner and look now and then, as the program in C++ does."""
+    from ompl import base, geometric, util
+
+    util.noOutputHandler()
+    util.RNG.setSeed(task["seed"] + 1)
+    space = _make_space(problem)
+    definition = _make_definition(space, problem)
+    objective = definition.getOptimizationObjective()
+    planner = getattr(geometric, PLANNERS[task["planner"]])(space)
+    for name, value in task["options"]:
+        planner.params().setParam(name, str(value))
+    planner.setProblemDefinition(definition)
+    watch = Stopwatch()
+    planner.setup()
+    found: list[dict[str, Any]] = []
+    following, last = min(task["first"], task["last"]), None
+    while True:
+        left = following - watch.read().wall
+        if left > 0.0:
+            planner.solve(base.timedPlannerTerminationCondition(left))
+        reading, cost, path = watch.read(), None, []
+        if definition.hasExactSolution():
+            cost = definition.getSolutionPath().cost(objective).value()
+            path = [] if cost == last else _path(definition)
+            last = cost
+        found.append({**reading._asdict(), "cost": cost, "path": path})
+        if following >= task["last"]:
+            return found
+        following = min(following * task["growth"], task["last"])
+
+
+def main(task: str) -> None:
+    """Plan and print the looks as JSON. task : scene and settings, JSON."""
+    options = json.loads(task)
+    problem = load_problem(options["scene"])
+    print(json.dumps({"looks": looks(problem, options)}))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

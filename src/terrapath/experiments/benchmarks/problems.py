@@ -35,7 +35,19 @@ def _three_peaks_discs() -> Problem:
     )
 
 
-OWN: dict[str, Callable[[], Problem]] = {"three-peaks-discs": _three_peaks_discs}
+def _jacksboro() -> Problem:
+    """Without the cells along its edges, of which some have no data: the peers know no masks."""
+    whole = scenes.load("jacksboro")
+    cell = 2.0 * whole.surface.resolution
+    low, high = whole.bounds[:2], whole.bounds[2:]
+    inner = (*(x + cell for x in low), *(x - cell for x in high))
+    return Problem(whole.surface, whole.start, whole.goal, inner, name="jacksboro")
+
+
+OWN: dict[str, Callable[[], Problem]] = {
+    "three-peaks-discs": _three_peaks_discs,
+    "jacksboro": _jacksboro,
+}
 
 
 @cache

@@ -28,7 +28,7 @@ class Library:
 
     name: str
     headers: tuple[str, ...]  # where to find one: patterns below an include directory
-    version: str  # what stands before it in that header
+    version: str  # begins the names of its parts in that header
     flags: tuple[str, ...]
     others: tuple[str, ...] = ()  # further directories of headers
 
@@ -44,8 +44,8 @@ class Library:
         if self._header is None:
             return None
         text = self._header.read_text(encoding="utf-8", errors="replace")
-        match = re.search(rf'{self.version}\s+"([^"]+)"', text)
-        return "unknown" if match is None else match.group(1)
+        parts = re.findall(rf"{self.version}_(?:MAJOR|MINOR|PATCH)_VERSION\s+(\d+)", text)
+        return ".".join(parts) or "unknown"
 
     @property
     def compiler_flags(self) -> list[str]:
@@ -59,7 +59,7 @@ class Library:
 OMPL = Library(
     "OMPL",
     ("ompl-*/ompl/config.h", "ompl/config.h"),
-    "OMPL_VERSION",
+    "OMPL",
     ("-lompl",),
     ("eigen3",),
 )
