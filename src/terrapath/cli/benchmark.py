@@ -16,19 +16,20 @@ def benchmark_command(
     what: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[WHAT]...", help="Some of bound, fast-marching, path and large-maps."
+            metavar="[WHAT]...",
+            help="Some of bound, fast-marching, path, large-maps, trees, grids, growth and edges.",
         ),
     ] = None,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="Fewer repetitions, smaller lattices: about a minute."),
+        typer.Option("--quick", help="Fewer repetitions, smaller lattices: some minutes."),
     ] = False,
     output: Annotated[
         Path, typer.Option(metavar="DIR", help="Directory for pictures, measures and report.")
     ] = Path("benchmark"),
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
 ) -> int:
-    """Measure bounds, fast marching, paths and large maps: the clock, the truth and the peers.
+    """Measure bounds, paths, trees, lattices and large maps: the clock, the truth and the peers.
 
     Peers that are not installed are named and left out. A run that was stopped goes on where
     it was when the same command is given again. Nothing else should run on the machine.

@@ -16,15 +16,19 @@ ONE_CORE = {
 }
 
 
-def run_fresh(module: str, task: dict[str, Any], what: str) -> Any:
+def run_fresh(module: str, task: dict[str, Any], what: str, timeout: float | None = None) -> Any:
     """What ``python -m`` prints of a module of this package that is given a task, from JSON.
 
-    what : is said where it fails, in a TerrapathError. One core is used.
+    what : is said where it fails, in a TerrapathError. One core is used. timeout : seconds.
     """
     command = [sys.executable, "-m", f"{__package__}.{module}", json.dumps(task)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, env={**os.environ, **ONE_CORE}
-    )
+    environment = {**os.environ, **ONE_CORE}
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, env=environment, timeout=timeout
+        )
+    except subprocess.TimeoutExpired:
+        raise TerrapathError(f"{what} did not end within {timeout:g} s") from None
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or ["no message"]
         raise TerrapathError(f"{what} ended with code {done.returncode}: {lines[-1]}")

@@ -33,6 +33,9 @@ LEVELS = (5e-2, 2e-2, 1e-2, NEAR)
 # How many times less time than OMPL's.
 CPP_TARGET, PYTHON_TARGET, NEAR_TARGET = 20.0, 500.0, 20.0
 
+# Seconds that a process of Python may take until it plans, on the slowest machine.
+LOADING = 120.0
+
 Options = tuple[tuple[str, Any], ...]
 
 
@@ -107,7 +110,8 @@ class TreeTrial(Trial[Curve]):
 
     def _in_python(self) -> Any:
         task = {"scene": self.scene, **asdict(self.planner)}
-        return run_fresh("ompl_python", task, f"OMPL through Python on {self.scene}")
+        what = f"{self.planner.planner} of OMPL through Python on {self.scene}"
+        return run_fresh("ompl_python", task, what, 10.0 * self.planner.last + LOADING)
 
     def decode(self, record: dict[str, Any]) -> Curve:
         """The curve from the fields that were stored."""
