@@ -369,9 +369,7 @@ def test_meshes_are_laid_over_the_surface():
 def test_growth_is_told_with_its_targets(runner, here):
     data = growth.run_growth(TINY, runner)
     assert [(row.scene, row.samples) for row in data.rows] == [
-        (ground, samples)
-        for ground in ("six-peaks", "four-layers")
-        for samples in (1_000, 10_000)
+        (ground, samples) for ground in ("six-peaks", "four-layers") for samples in (1_000, 10_000)
     ]
     assert len(growth.GROUND["four-layers"]().surface.layers) == 4
     assert all(row.found.length > 14.0 for row in data.rows)

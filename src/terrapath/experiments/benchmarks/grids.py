@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import metric, scenes
 from ...lattice import Lattice
-from ...planners import plan
+from ...planners import Dijkstra
 from ...problem import Problem
 from ...validation import Array
 from ..runner import Runner
@@ -79,8 +79,7 @@ def _marching(problem: Problem, lattice: Lattice) -> float:
 
 def _dijkstra(neighbours: int) -> Callable[[Problem, Lattice], float]:
     def distance(problem: Problem, lattice: Lattice) -> float:
-        options = {"spacing": lattice.dx, "neighbours": neighbours}
-        found = plan(problem, "dijkstra", **options)
+        found = Dijkstra(spacing=lattice.dx, neighbours=neighbours).solve(problem)
         assert found.cost is not None
         return found.cost
 
@@ -177,9 +176,7 @@ METHODS = {
     "fast-marching": Method("fast marching", _marching),
     "dijkstra-8": Method("Dijkstra, 8 neighbours", _dijkstra(8)),
     "dijkstra-32": Method("Dijkstra, 32 neighbours", _dijkstra(32)),
-    "mcp": Method(
-        "scikit-image MCP_Geometric", _least_cost, SCIKIT_IMAGE, feature="MCP_Geometric"
-    ),
+    "mcp": Method("scikit-image MCP_Geometric", _least_cost, SCIKIT_IMAGE, feature="MCP_Geometric"),
     "heat": Method(
         "potpourri3d, heat method", _heat, POTPOURRI, feature="MeshHeatMethodDistanceSolver"
     ),

@@ -70,7 +70,8 @@ def _gradients_of_spline(surface: Spline) -> Gradients:
         found = np.empty((len(points), len(surface.weights), 2))
         found[..., 0] = np.einsum("lmji,mj,mi->ml", patch, by, sx) / surface.dx
         found[..., 1] = np.einsum("lmji,mj,mi->ml", patch, sy, bx) / surface.dy
-        return found * surface.weights[:, None]
+        found *= surface.weights[:, None]
+        return found
 
     return gradients
 

@@ -11,9 +11,7 @@ from typing import Any
 from ...errors import TerrapathError
 
 # Numerical libraries would otherwise use every core.
-ONE_CORE = {
-    name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-}
+ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def run_fresh(module: str, task: dict[str, Any], what: str, timeout: float | None = None) -> Any:

@@ -14,10 +14,10 @@ from ..runner import Runner
 from ..trials import Trial
 from .curves import Curve, CurvePoint, MedianCurve, curve_of_looks
 from .exchange import write_problem
-from .peers import OMPL_PYTHON
+from .peers import OMPL_PYTHON, Peer
 from .problems import Optimum, OptimumRuns, find_optimum, load_problem, problem_settings
 from .processes import run_fresh
-from .programs import OMPL_PLANNERS
+from .programs import OMPL_PLANNERS, Program
 from .settings import Scale
 from .timing import Target, Timing, percent, rebuilt, timed
 
@@ -304,7 +304,7 @@ class _Comparison:
 
 def _present() -> tuple[set[str], dict[str, str], list[str]]:
     """Programs that can be run, their versions, and what is said of the others."""
-    peers = {CPP: OMPL_PLANNERS, PYTHON: OMPL_PYTHON}
+    peers: dict[str, Program | Peer] = {CPP: OMPL_PLANNERS, PYTHON: OMPL_PYTHON}
     versions = {name: peer.version for name, peer in peers.items()}
     missing = [peer.missing for name, peer in peers.items() if versions[name] is None]
     found = {name: version for name, version in versions.items() if version is not None}
