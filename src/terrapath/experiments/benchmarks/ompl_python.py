@@ -171,6 +171,15 @@ PLANNERS = {
 }
 
 
+# The bindings do not hand out planners' parameters: their names in C++, and how to set them.
+SETTERS = {
+    "range": ("setRange", float),
+    "use_k_nearest": ("setKNearest", bool),
+    "rewire_factor": ("setRewireFactor", float),
+    "samples_per_batch": ("setSamplesPerBatch", int),
+}
+
+
 def _path(definition: Any) -> list[float]:
     states = definition.getSolutionPath().getStates()
     return [float(state[k]) for state in states for k in (0, 1)]
@@ -187,7 +196,8 @@ def looks(problem: Problem, task: dict[str, Any]) -> list[dict[str, Any]]:
     objective = definition.getOptimizationObjective()
     planner = getattr(geometric, PLANNERS[task["planner"]])(space)
     for name, value in task["options"]:
-        planner.params().setParam(name, str(value))
+        setter, kind = SETTERS[name]
+        getattr(planner, setter)(kind(value))
     planner.setProblemDefinition(definition)
     watch = Stopwatch()
     planner.setup()
