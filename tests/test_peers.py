@@ -1,6 +1,7 @@
 """The benchmark's peers: programs in C++, OMPL through Python, lattices, growth, edges."""
 
 import dataclasses
+import itertools
 import json
 import math
 import subprocess
@@ -273,7 +274,7 @@ def test_ompl_in_cpp_believes_what_our_edges_say(scene):
     chords = metric.chord(problem.surface, path[:-1], path[1:])
     # Some edges are longer than a panel.
     measure = ompl_python.line_r_with_numpy(problem)
-    ours = [measure(*a, *b) for a, b in zip(path[:-1], path[1:], strict=True)]
+    ours = [measure(*a, *b) for a, b in itertools.pairwise(path)]
     assert first["cost"] == pytest.approx(np.maximum(ours, chords).sum(), rel=1e-12)
     assert curves.true_length_of(problem, path) > 15.0
 
