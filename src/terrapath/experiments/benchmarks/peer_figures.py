@@ -102,6 +102,7 @@ def draw_growth(data: GrowthData, directory: Path) -> list[Path]:
         allowed = [seconds[0] * (count / samples[0]) ** power for count in samples]
         axes.loglog(samples, allowed, ":", color=TARGET_COLOUR, lw=1.2)
     axes.set(xlabel="samples", ylabel="seconds", title="growth, and the most allowed")
+    axes.set_xticks(sorted({row.samples for row in data.rows}))
     label_plain(axes.xaxis)
     label_plain(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
