@@ -54,8 +54,10 @@ def _scene_trees(name: str, scene: SceneTrees) -> Iterator[str]:
     header = ["planner", "best options", *(f"within {percent(level)}" for level in LEVELS)]
     header += ["in all", "excess then (quartiles)"]
     optimum = f"Shortest path: {scene.optimum.length:.10g}"
-    if scene.optimum.gap is not None:
-        optimum += f", by `optimal`, proven to {percent(scene.optimum.gap)}"
+    if scene.optimum.searched:
+        gap = scene.optimum.gap
+        proof = "without proof" if gap is None else f"with a proven gap of {percent(gap)}"
+        optimum += f", the shortest that was found, by `optimal` {proof}"
     yield from (f"### {name}", "", f"{optimum}.", "")
     yield from markdown_table(header, [_tree_row(scene, label) for label in scene.found])
 

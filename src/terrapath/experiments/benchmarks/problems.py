@@ -92,7 +92,8 @@ class Optimum:
     """The length that paths are measured against, map units."""
 
     length: float
-    gap: float | None  # proven of it; None where it is known to ten digits
+    gap: float | None  # proven of it; None where nothing is
+    searched: bool = True  # by ``optimal``; otherwise it is known to ten digits
 
 
 @dataclass(frozen=True)
@@ -123,6 +124,6 @@ def find_optimum(name: str, runs: OptimumRuns, runner: Runner) -> Optimum:
     """The length of a problem's shortest path: known, or searched for."""
     scene = scenes.SCENES.get(name)
     if scene is not None and scene.true_length is not None:
-        return Optimum(scene.true_length, None)
+        return Optimum(scene.true_length, None, searched=False)
     (found,) = runner.run(f"optimum of {name}", [OptimumTrial(name, runs)])
     return found
