@@ -17,19 +17,20 @@ def benchmark_command(
         list[str] | None,
         typer.Argument(
             metavar="[WHAT]...",
-            help="Some of bound, fast-marching, path, large-maps and startup.",
+            help="Some of bound, fast-marching, path, large-maps, startup, trees, grids, growth "
+            "and edges.",
         ),
     ] = None,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help="Fewer repetitions, smaller lattices: about a minute."),
+        typer.Option("--quick", help="Fewer repetitions, smaller lattices: some minutes."),
     ] = False,
     output: Annotated[
         Path, typer.Option(metavar="DIR", help="Directory for pictures, measures and report.")
     ] = Path("benchmark"),
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
 ) -> int:
-    """Measure bounds, fast marching, paths, large maps and start-up: clock, truth and peers.
+    """Measure bounds, paths, trees, lattices, large maps, start-up: clock, truth and peers.
 
     Peers that are not installed are named and left out. A run that was stopped goes on where
     it was when the same command is given again. Nothing else should run on the machine.

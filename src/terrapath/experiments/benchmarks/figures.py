@@ -17,12 +17,14 @@ TARGET_COLOUR = "#e4002b"
 LEAST_EXCESS = 1e-9
 
 
-def _label_percent(axis: Any) -> None:
+def label_percent(axis: Any) -> None:
+    """Ticks of an axis in percent."""
     axis.set_major_formatter(lambda value, _: percent(value))
     axis.set_minor_formatter("")
 
 
-def _label_plain(axis: Any) -> None:
+def label_plain(axis: Any) -> None:
+    """Ticks of an axis as plain numbers."""
     axis.set_major_formatter("{x:,g}")
     axis.set_minor_formatter("")
 
@@ -55,8 +57,8 @@ def draw_bound(data: BoundData, directory: Path) -> list[Path]:
         ylabel="proven gap, (length - bound) / bound",
         title="Lower bounds with certificates",
     )
-    _label_plain(axes.xaxis)
-    _label_percent(axes.yaxis)
+    label_plain(axes.xaxis)
+    label_percent(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=9)
     path = directory / "benchmark-bound.png"
@@ -84,7 +86,7 @@ def _draw_errors(axes: Any, rows: dict[str, list[MarchRow]]) -> None:
         label = f"{scene}, HamiltonFastMarching"
         axes.loglog(*zip(*known, strict=True), "D", mfc="none", ms=8, color=f"C{k}", label=label)
     axes.set(ylabel="relative error, absolute", title="error at the goal")
-    _label_percent(axes.yaxis)
+    label_percent(axes.yaxis)
 
 
 def draw_marching(data: MarchData, directory: Path) -> list[Path]:
@@ -100,10 +102,10 @@ def draw_marching(data: MarchData, directory: Path) -> list[Path]:
         axes.set_xlabel("nodes a side")
         # 961 and 1,001 would lie on each other.
         axes.set_xticks(sorted({row.nodes for row in data.rows} - {961}))
-        _label_plain(axes.xaxis)
+        label_plain(axes.xaxis)
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize=9)
-    _label_plain(left.yaxis)
+    label_plain(left.yaxis)
     path = directory / "benchmark-fast-marching.png"
     save_figure(figure, path)
     return [path]
@@ -152,8 +154,8 @@ def draw_paths(data: PathsData, directory: Path) -> list[Path]:
             axes.axvline(TARGET_SECONDS, color=TARGET_COLOUR, ls=":", lw=1.2)
         axes.set_title(scene)
         axes.grid(alpha=0.3)
-        _label_plain(axes.xaxis)
-        _label_percent(axes.yaxis)
+        label_plain(axes.xaxis)
+        label_percent(axes.yaxis)
     for axes in panels[-1]:
         axes.set_xlabel("seconds")
     for axes in panels[:, 0]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from ...planners import make_finished
 from ...problem import Problem
 from ..runner import Runner
 from ..trials import Trial
+from .processes import run_fresh
 from .settings import Scale
 from .timing import Reading, Target, Timing, rebuilt, timed
 
@@ -75,16 +75,9 @@ class LargeMapTrial(Trial[LargeMapFound]):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "map.tif"
             write_map(path, self.planner.cells)
-            task = json.dumps({"path": str(path), **asdict(self.planner)})
-            command = [sys.executable, "-m", f"{__package__}.large_maps", task]
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines() or ["no message"]
-            raise TerrapathError(
-                f"planning on {self.planner.cells:,} cells a side ended with code "
-                f"{done.returncode}: {lines[-1]}"
-            )
-        return self.decode(json.loads(done.stdout))
+            task = {"path": str(path), **asdict(self.planner)}
+            what = f"planning on {self.planner.cells:,} cells a side"
+            return self.decode(run_fresh("large_maps", task, what))
 
     def decode(self, record: dict[str, Any]) -> LargeMapFound:
         """The measures from the fields that were stored."""

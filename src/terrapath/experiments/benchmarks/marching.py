@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ...errors import TerrapathError
 from ..runner import Runner
 from ..trials import Trial
 from .peers import SCIKIT_FMM
+from .processes import run_fresh
 from .settings import Scale, true_length
 from .timing import Target, Timing, rebuilt
 
@@ -79,16 +76,9 @@ class MarchTrial(Trial[Marched]):
 
     def measure(self) -> Marched:
         """Start the process and read what it prints."""
-        task = json.dumps({"scene": self.scene, **asdict(self.planner)})
-        command = [sys.executable, "-m", f"{__package__}.fresh", task]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            lines = done.stderr.strip().splitlines() or ["no message"]
-            raise TerrapathError(
-                f"fast marching on {self.planner.nodes:,} nodes a side ended with code "
-                f"{done.returncode}: {lines[-1]}"
-            )
-        return self.decode(json.loads(done.stdout))
+        task = {"scene": self.scene, **asdict(self.planner)}
+        what = f"fast marching on {self.planner.nodes:,} nodes a side"
+        return self.decode(run_fresh("fresh", task, what))
 
     def decode(self, record: dict[str, Any]) -> Marched:
         """The measures from the fields that were stored."""

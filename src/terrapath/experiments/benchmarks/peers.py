@@ -37,3 +37,7 @@ class Peer:
 
 
 SCIKIT_FMM = Peer("scikit-fmm", "skfmm")
+SCIKIT_IMAGE = Peer("scikit-image", "skimage.graph")
+POTPOURRI = Peer("potpourri3d", "potpourri3d")
+PYGEODESIC = Peer("pygeodesic", "pygeodesic.geodesic")
+OMPL_PYTHON = Peer("ompl", "ompl.geometric")

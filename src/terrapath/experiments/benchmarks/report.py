@@ -42,8 +42,9 @@ def _targets_table(targets: Iterable[Target]) -> list[str]:
     for target in targets:
         unit = f" {target.unit}" if target.unit else ""
         found = NOTHING if target.found is None else f"{target.found:.3g}{unit}"
-        rows.append([target.what, f"{target.limit:.3g}{unit}", found, target.verdict])
-    return markdown_table(["target", "at most", "measured", "verdict"], rows)
+        side = "at least" if target.at_least else "at most"
+        rows.append([target.what, f"{side} {target.limit:.3g}{unit}", found, target.verdict])
+    return markdown_table(["target", "limit", "measured", "verdict"], rows)
 
 
 def bound_lines(data: BoundData) -> list[str]:

@@ -15,7 +15,21 @@ from ..report import processor
 from ..reproduce import REPORT_FILE, TRIALS, claim
 from ..runner import Runner, Watch, watch_nothing
 from ..trials import Store
-from . import bound, figures, large_maps, marching, paths, report, startup
+from . import (
+    bound,
+    edges,
+    figures,
+    grids,
+    growth,
+    large_maps,
+    marching,
+    paths,
+    peer_figures,
+    peer_report,
+    report,
+    startup,
+    trees,
+)
 from .settings import FULL, QUICK, Scale
 from .timing import Target, Timing, percent
 
@@ -81,6 +95,38 @@ EXPERIMENTS = {
         startup.startup_targets,
         report.startup_lines,
         lambda data: [found.timing for _, found in data.found],
+        lambda data, directory: [],
+    ),
+    "trees": Experiment(
+        "Trees beside OMPL",
+        trees.run_trees,
+        trees.trees_targets,
+        peer_report.trees_lines,
+        trees.trees_timings,
+        peer_figures.draw_trees,
+    ),
+    "grids": Experiment(
+        "Lattices and meshes: seconds and error",
+        grids.run_grids,
+        grids.grids_targets,
+        peer_report.grids_lines,
+        lambda data: [row.found.timing for row in data.rows],
+        peer_figures.draw_grids,
+    ),
+    "growth": Experiment(
+        "Growth of RRT\\*-R: seconds and memory",
+        growth.run_growth,
+        growth.growth_targets,
+        peer_report.growth_lines,
+        lambda data: [row.found.timing for row in data.rows],
+        peer_figures.draw_growth,
+    ),
+    "edges": Experiment(
+        "Edges: Line-R in a batch",
+        edges.run_edges,
+        edges.edges_targets,
+        peer_report.edges_lines,
+        lambda data: [found.ours for found in data.found.values()],
         lambda data, directory: [],
     ),
 }

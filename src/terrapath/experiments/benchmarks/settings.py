@@ -30,6 +30,25 @@ class Scale:
     most_samples: int = 100_000
     warm_starts: int = 9
     cold_starts: int = 3
+    # Trees beside OMPL's.
+    tree_scenes: tuple[str, ...] = ("six-peaks", "three-peaks", "three-peaks-discs", "jacksboro")
+    tree_seeds: int = 20
+    few_tree_seeds: int = 5  # of OMPL's other planners through Python
+    sweep_seeds: int = 3  # of each choice of options
+    tree_looks: tuple[int, int] = (100, 50_000)  # samples: the first, the last
+    cpp_looks: tuple[float, float] = (0.001, 5.0)  # seconds
+    python_looks: tuple[float, float] = (0.02, 15.0)
+    optimum_gap: float = 1e-3  # to prove of the shortest paths that are not known
+    optimum_seconds: float = 60.0
+    # Lattices: nodes on a side of each.
+    grid_scenes: tuple[str, ...] = ("one-peak", "three-peaks", "four-peaks")
+    grid_nodes: tuple[int, ...] = (121, 241, 481, 961)
+    mesh_nodes: tuple[int, ...] = (121, 241)  # of exact geodesics
+    grid_repeats: int = 3
+    growth_samples: tuple[int, int] = (100_000, 1_000_000)
+    growth_repeats: int = 3
+    edges: int = 200_000
+    edge_repeats: int = 9
 
 
 FULL = Scale()
@@ -43,6 +62,21 @@ QUICK = Scale(
     tree_samples=(3_000, 10_000),
     warm_starts=3,
     cold_starts=1,
+    tree_scenes=("six-peaks",),
+    tree_seeds=5,
+    few_tree_seeds=1,
+    sweep_seeds=1,
+    tree_looks=(100, 20_000),
+    cpp_looks=(0.002, 2.0),
+    python_looks=(0.02, 4.0),
+    grid_scenes=("three-peaks",),
+    grid_nodes=(121, 241),
+    mesh_nodes=(121,),
+    grid_repeats=1,
+    growth_samples=(20_000, 200_000),
+    growth_repeats=1,
+    edges=50_000,
+    edge_repeats=5,
 )
 
 

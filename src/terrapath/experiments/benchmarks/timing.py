@@ -79,11 +79,14 @@ class Target:
     unit: str
     found: float | None  # None where it was never reached
     instead: str = ""  # said then
+    at_least: bool = False  # the limit is one from below
 
     @property
     def met(self) -> bool:
-        """Is what was found no more than the limit?"""
-        return self.found is not None and self.found <= self.limit
+        """Is what was found on the right side of the limit?"""
+        if self.found is None:
+            return False
+        return self.found >= self.limit if self.at_least else self.found <= self.limit
 
     @property
     def verdict(self) -> str:
