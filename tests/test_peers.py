@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -314,7 +315,9 @@ def test_a_program_that_does_not_compile_is_left_out(tmp_path, monkeypatch):
     assert "apt-get install g++" in programs.Program("Other", "broken.cpp").missing
 
 
-def test_a_program_needs_its_library():
+def test_a_program_needs_its_library(monkeypatch):
+    # The sources are the repository's, wherever the package is installed.
+    monkeypatch.setattr(programs, "SOURCES", Path(__file__).parents[1] / "benchmarks")
     library = programs.Library("Nothing", ("no/such/header.h",), "NONE", ())
     program = programs.Program("Planners", "planners.cpp", library, "libnothing-dev")
     assert library.found_version is None
