@@ -138,7 +138,10 @@ def _draw_path(axes: Any, solution: Solution) -> None:
     halo = [patheffects.withStroke(linewidth=4.6, foreground="white")]
     if solution.path is not None:
         straight = np.array([problem.start, problem.goal])
-        axes.plot(*straight.T, color="white", lw=1.1, ls=(0, (4, 3)), zorder=4, label="straight")
+        # White shows on dark ground; the outline, on bright ground and in the legend.
+        outline = [patheffects.withStroke(linewidth=3.2, foreground="#303030")]
+        style = {"color": "white", "lw": 1.6, "ls": (0, (4, 3)), "path_effects": outline}
+        axes.plot(*straight.T, zorder=4, label="straight", **style)
         _draw_alternatives(axes, solution)
         axes.plot(
             *solution.path.points.T,
