@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from terrapath import scenes
+from terrapath import memory, scenes
 from terrapath.cli.main import run
 from terrapath.errors import TerrapathError
 from terrapath.experiments.benchmarks import (
@@ -259,13 +259,13 @@ def test_a_fresh_process_that_fails_is_one_line(monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak is only reset on Linux")
 def test_the_peak_of_memory_is_that_of_what_was_touched():
-    fresh.forget_peak()
-    before = fresh.peak_memory()
+    memory.forget_peak()
+    before = memory.peak_memory()
     held = np.ones(8_000_000)
-    assert 60e6 < fresh.peak_memory() - before < 90e6
+    assert 60e6 < memory.peak_memory() - before < 90e6
     del held
-    fresh.forget_peak()
-    assert fresh.peak_memory() - before < 30e6
+    memory.forget_peak()
+    assert memory.peak_memory() - before < 30e6
 
 
 def test_every_planner_is_measured_and_lattices_never_get_near(runner):

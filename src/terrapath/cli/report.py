@@ -9,6 +9,7 @@ import numpy as np
 
 from ..certificate import Certificate
 from ..eikonal import DistanceField
+from ..memory import peak_memory
 from ..planners import GoalAnswer
 from ..problem import Path, Problem, Solution, Status
 from ..surface import Layer, Surface
@@ -103,7 +104,9 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     yield "seconds", f"{solution.seconds:.3f}"
     if solution.counters:
         yield "counters", _counter_line(solution)
-    yield "memory", f"{_peak_memory():,.0f} MB at most"
+    peak = peak_memory()
+    if peak is not None:
+        yield "memory", f"{peak / 1e6:,.0f} MB at most"
 
 
 def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
@@ -175,14 +178,6 @@ def _constraints(problem: Problem) -> Iterator[tuple[str, str]]:
         yield "steepest ground", f"{problem.max_slope:g} degrees"
     if problem.keep_in is not None:
         yield "keep-in area", f"{problem.keep_in.area:,.6g} {unit}^2" if unit else "given"
-
-
-def _peak_memory() -> float:
-    """Of this process since it began, MB."""
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak * (1e-6 if sys.platform == "darwin" else 1.024e-3)
 
 
 def _print_table(rows: Iterable[tuple[str, str]]) -> None:

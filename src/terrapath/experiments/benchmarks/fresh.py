@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import suppress
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ import numpy as np
 from ... import scenes
 from ...eikonal import DistanceField, Medium, march_from
 from ...lattice import Lattice
+from ...memory import forget_peak, peak_memory
 from ...problem import Problem
 from .marching import Marched, MarchRuns
 from .peers import SCIKIT_FMM
@@ -21,27 +20,6 @@ from .timing import Reading, Timing, timed
 
 # Nodes on a side of the lattice that everything is compiled on.
 SMALL = 61
-
-
-def peak_memory() -> int | None:
-    """The most memory that this process has had, bytes; None where the system does not tell.
-
-    Not by ``ru_maxrss`` on Linux: a process inherits its parent's there.
-    """
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-    except OSError:
-        return _peak_memory_elsewhere()
-    return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
-
-
-def _peak_memory_elsewhere() -> int | None:
-    try:
-        import resource
-    except ImportError:
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else 1024 * peak
 
 
 class TimedMedium(Medium):
@@ -92,12 +70,6 @@ class Bench:
         row = round((start[1] - lattice.bounds.x2_min) / lattice.dy)
         phi[row, column] = -1.0
         return timed(lambda: skfmm.travel_time(phi, speed, dx=lattice.dx, order=2))[1]
-
-
-def forget_peak() -> None:
-    """Let the peak start anew from here, where the system can; compiling had one of its own."""
-    with suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 
 
 def measure_marching(scene: str, runs: MarchRuns) -> Marched:

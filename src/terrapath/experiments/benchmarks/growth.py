@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from ... import scenes
+from ...memory import forget_peak, peak_memory
 from ...planners import plan
 from ...problem import Problem
 from ...surface import Surface
@@ -150,8 +151,6 @@ def growth_targets(data: GrowthData) -> list[Target]:
 
 def measure_growth(scene: str, runs: GrowthRuns) -> GrowthFound:
     """Memory of the first run, seconds of all; samples are drawn everywhere."""
-    from .fresh import forget_peak, peak_memory
-
     problem = GROUND[scene]()
 
     def grow(samples: int) -> Any:

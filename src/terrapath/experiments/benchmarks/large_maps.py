@@ -16,6 +16,7 @@ import numpy as np
 from ...corridor import MOST_CELLS, Part, plan_in_corridor
 from ...errors import TerrapathError
 from ...io import read_surface
+from ...memory import forget_peak, peak_memory
 from ...planners import make_finished
 from ...problem import Problem
 from ..runner import Runner
@@ -150,8 +151,6 @@ def write_map(path: Path, cells: int) -> None:
 
 def measure_large_map(path: str, runs: LargeMapRuns) -> LargeMapFound:
     """From corner to corner, on a map that is far larger than what was warmed up on."""
-    from .fresh import forget_peak, peak_memory
-
     planner = make_finished(runs.planner, refine=True, bound=True)
 
     def pose(part: Part) -> tuple[Problem, Sequence[Any]]:
