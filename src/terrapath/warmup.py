@@ -24,9 +24,7 @@ from .planners import plan
 from .problem import Problem
 from .refinement import refine
 from .surface import Mask, Surface
-
-# Called with what is being compiled, how many rehearsals are done, and of how many.
-Watch = Callable[[str, int, int], None]
+from .watch import Watch, watch_nothing
 
 # What was compiled for which kernels; it lies beside them.
 LIST_FILE = "terrapath-warm.json"
@@ -164,10 +162,6 @@ def _write_list(directory: Path, names: list[str]) -> None:
 def _warmth(directory: Path, names: list[str], compiled: int) -> Warmth:
     size = sum((directory / name).stat().st_size for name in names)
     return Warmth(compiled, sum(name.endswith(".nbc") for name in names), size, directory)
-
-
-def watch_nothing(stage: str, done: int, total: int) -> None:
-    """Nobody is watching."""
 
 
 def warm_up(watch: Watch = watch_nothing) -> Warmth:

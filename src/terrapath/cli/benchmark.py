@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .exit_codes import ExitCode
-from .reproduce import stages
+from ..watch import Watch
+from .resumable import run_resumable
 
 
 def benchmark_command(
@@ -36,17 +35,10 @@ def benchmark_command(
     it was when the same command is given again. Nothing else should run on the machine.
     Exit codes: 0 done, whatever was measured, 2 bad input, 130 interrupted.
     """
-    try:
+
+    def work(watch: Watch) -> Path:
         from ..experiments.benchmarks.run import benchmark
 
-        with stages(quiet) as watch:
-            report = benchmark(what or (), output, quick=quick, watch=watch)
-    except KeyboardInterrupt:
-        print(
-            f"terrapath: interrupted; what was measured is kept in {output / 'trials'}, and "
-            "the same command goes on from there",
-            file=sys.stderr,
-        )
-        return ExitCode.INTERRUPTED
-    typer.echo(report)
-    return ExitCode.SOLVED
+        return benchmark(what or (), output, quick=quick, watch=watch)
+
+    return run_resumable(work, output, quiet)

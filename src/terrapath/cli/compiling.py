@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from .bars import is_watched
 from .remarks import remark
 
 # Where `_kernels/compiler.py` logs each kernel that the cache lacks.
@@ -15,7 +15,7 @@ LOGGER = "terrapath.kernels"
 @contextmanager
 def compiling_told(quiet: bool = False) -> Iterator[None]:
     """Say once on standard error that kernels are compiled, if any are and somebody watches."""
-    if quiet or not sys.stderr.isatty():
+    if not is_watched(quiet):
         yield
         return
     import logging

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from ..planners.base import SEARCHING, Callback, Progress
 from ..problem import Problem
+from .bars import is_watched, make_bars
 from .report import percent
 
 
@@ -18,21 +18,11 @@ def progress_bar(problem: Problem | None, quiet: bool) -> Iterator[Callback | No
 
     problem : tells the unit, where it is known beforehand.
     """
-    if quiet or not sys.stderr.isatty():
+    if not is_watched(quiet):
         yield None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bar
-
-    columns = (
-        TextColumn("[bold]{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
     unit = "" if problem is None else problem.surface.unit
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+    with make_bars() as bar:
         # Until the first report the kernels are loaded, or compiled where they are new.
         task = bar.add_task("preparing kernels", total=None)
 

@@ -2,44 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from .bars import bar_for_all
 from .exit_codes import ExitCode
-
-if TYPE_CHECKING:
-    from ..warmup import Watch
-
-
-@contextmanager
-def _bar(quiet: bool) -> Iterator[Watch]:
-    """One bar on standard error, where somebody is watching."""
-    from ..warmup import watch_nothing
-
-    if quiet or not sys.stderr.isatty():
-        yield watch_nothing
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (
-        TextColumn("[bold]compiling kernels: {task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-
-        def show(stage: str, done: int, total: int) -> None:
-            bar.update(task, description=stage, completed=done, total=total)
-
-        yield show
 
 
 def warmup_command(
@@ -53,7 +22,7 @@ def warmup_command(
     from ..warmup import warm_up
 
     started = time.perf_counter()
-    with _bar(quiet) as watch:
+    with bar_for_all("compiling kernels", quiet) as watch:
         warmth = warm_up(watch)
     if quiet:
         return ExitCode.SOLVED

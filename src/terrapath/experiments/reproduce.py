@@ -11,10 +11,11 @@ from .. import __version__
 from ..errors import InputError, MapError
 from ..files import require_writable, written_whole
 from ..validation import require_count, require_seed
+from ..watch import Watch, watch_nothing
 from .figures import draw
 from .paper import EXPERIMENTS, FULL, QUICK, Settings
 from .report import make_report
-from .runner import Runner, Watch, watch_nothing
+from .runner import Runner
 from .trials import Store
 
 ALL = "all"

@@ -6,7 +6,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
@@ -14,15 +14,8 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any
 
+from ..watch import Watch, watch_nothing
 from .trials import Result, Store, Trial
-
-# Called with the name of a stage, what is done of it and all of it.
-Watch = Callable[[str, int, int], None]
-
-
-def watch_nothing(stage: str, done: int, total: int) -> None:
-    """Nobody is watching."""
-
 
 # Held while a result is written, so that a worker that is told to end leaves no half file.
 _SAVING = threading.Lock()

@@ -11,9 +11,10 @@ from typing import Any
 from ... import __version__
 from ...errors import InputError
 from ...files import require_writable, written_whole
+from ...watch import Watch, watch_nothing
 from ..report import processor
 from ..reproduce import REPORT_FILE, TRIALS, claim
-from ..runner import Runner, Watch, watch_nothing
+from ..runner import Runner
 from ..trials import Store
 from . import (
     bound,
