@@ -490,6 +490,7 @@ def test_init_overwrites_nothing_unless_forced(folder, capsys):
 
 def test_an_interrupt_in_a_middle_leg_writes_nothing(folder, capsys, monkeypatch):
     from terrapath.planners import itinerary
+    from terrapath.planners.base import INTERRUPT, without_path
 
     solve = itinerary._Tour.leg
 
@@ -502,7 +503,7 @@ def test_an_interrupt_in_a_middle_leg_writes_nothing(folder, capsys, monkeypatch
         try:
             return interrupt(tour, problem, number, count)
         except KeyboardInterrupt:
-            return itinerary._interrupted(problem, "rrt")
+            return without_path(problem, "rrt", tp.Status.INTERRUPTED, INTERRUPT)
 
     monkeypatch.setattr(itinerary._Tour, "leg", leg)
     code = run(["plan", "one-peak", "--via", "8,2", "--output", "a.json", *QUICK, "--json"])

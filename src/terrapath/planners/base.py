@@ -68,6 +68,28 @@ def stay_put(problem: Problem, planner: str, seed: int | None = None) -> Solutio
     )
 
 
+def without_path(
+    problem: Problem,
+    planner: str,
+    status: Status,
+    stopped_by: str,
+    *,
+    seconds: float = 0.0,
+    seed: int | None = None,
+) -> Solution:
+    """The answer where nothing was searched, and there is no path."""
+    return Solution(
+        problem=problem,
+        planner=planner,
+        status=status,
+        path=None,
+        cost=None,
+        seconds=seconds,
+        seed=seed,
+        stopped_by=stopped_by,
+    )
+
+
 def answer_without_search(
     problem: Problem, planner: str, seed: int | None = None
 ) -> Solution | None:
@@ -81,13 +103,5 @@ def answer_without_search(
     started = time.perf_counter()
     if not problem.is_unreachable:
         return None
-    return Solution(
-        problem=problem,
-        planner=planner,
-        status=Status.UNREACHABLE,
-        path=None,
-        cost=None,
-        seconds=time.perf_counter() - started,
-        seed=seed,
-        stopped_by=SEPARATED,
-    )
+    seconds = time.perf_counter() - started
+    return without_path(problem, planner, Status.UNREACHABLE, SEPARATED, seconds=seconds, seed=seed)

@@ -15,7 +15,7 @@ import numpy as np
 from .. import metric
 from ..errors import InputError
 from ..problem import Path, Problem, Solution, Status
-from .base import INTERRUPT, SEPARATED, Callback, Planner, Progress
+from .base import INTERRUPT, SEPARATED, Callback, Planner, Progress, without_path
 
 # From best to worst: a tour ends as its worst leg does.
 _WORSE = (Status.SOLVED, Status.NOT_FOUND, Status.INTERRUPTED, Status.UNREACHABLE)
@@ -154,7 +154,8 @@ class _Tour:
         legs = [whole.between(a, b) for a, b in pairwise(points)]
         if len(legs) > 1 and any(leg.is_unreachable for leg in legs):
             k = next(k for k, leg in enumerate(legs, start=1) if leg.is_unreachable)
-            return _unreachable(whole, self.planner.name, k, len(legs))
+            reason = f"leg {k} of {len(legs)}: {SEPARATED}"
+            return without_path(whole, self.planner.name, Status.UNREACHABLE, reason)
         solutions: list[Solution] = []
         for k, leg in enumerate(legs, start=1):
             solutions.append(self.leg(leg, k, len(legs)))
@@ -172,7 +173,7 @@ class _Tour:
             try:
                 self.planned[ends] = planner.solve(leg, callback=self.watch(number, count))
             except KeyboardInterrupt:  # between the leg before and this one
-                return _interrupted(leg, planner.name)
+                return without_path(leg, planner.name, Status.INTERRUPTED, INTERRUPT)
         return self.planned[ends]
 
     def with_share(self, count: int) -> Planner:
@@ -207,30 +208,6 @@ def _limited(planner: Any, seconds: float) -> Any:
     if "planner" in names:
         changes["planner"] = _limited(planner.planner, seconds)
     return replace(planner, **changes) if changes else planner
-
-
-def _interrupted(leg: Problem, planner: str) -> Solution:
-    return Solution(
-        problem=leg,
-        planner=planner,
-        status=Status.INTERRUPTED,
-        path=None,
-        cost=None,
-        seconds=0.0,
-        stopped_by=INTERRUPT,
-    )
-
-
-def _unreachable(problem: Problem, planner: str, number: int, count: int) -> Solution:
-    return Solution(
-        problem=problem,
-        planner=planner,
-        status=Status.UNREACHABLE,
-        path=None,
-        cost=None,
-        seconds=0.0,
-        stopped_by=f"leg {number} of {count}: {SEPARATED}",
-    )
 
 
 def joined(problem: Problem, legs: Sequence[Solution], count: int) -> Solution:
