@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-import numpy as np
 import shapely
 
 from . import metric
@@ -86,9 +85,7 @@ class Corridor:
     @staticmethod
     def least_length(solution: Solution) -> float:
         """No path on the whole map is shorter: the chords from stop to stop, map units."""
-        legs = solution.legs or (solution,)
-        stops = np.array([legs[0].problem.start, *(leg.problem.goal for leg in legs)])
-        return float(metric.chord(solution.problem.surface, stops[:-1], stops[1:]).sum())
+        return metric.chord_through(solution.problem.surface, solution.stops)
 
 
 # The problem on a part of the map, and the points that are to be passed.

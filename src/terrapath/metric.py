@@ -86,6 +86,12 @@ def chord(surface: Surface, a: Any, b: Any) -> Array:
     return _measure(lengths.fill_chords, surface, a, b)
 
 
+def chord_through(surface: Surface, points: Any) -> float:
+    """A lower bound of every path through points (m, 2), in their order: their chords' sum."""
+    array = as_points(points)
+    return float(chord(surface, array[:-1], array[1:]).sum())
+
+
 def segment_lengths(surface: Surface, a: Any, b: Any) -> Array:
     """True lengths of the segments a-b under h, by adaptive quadrature to 1e-9 relative.
 

@@ -309,6 +309,17 @@ class Solution:
         return (self.length - self.lower_bound) / self.lower_bound
 
     @property
+    def stops(self) -> Array:
+        """(k, 2): the start and where each leg ends, map units; two points without legs."""
+        ends = [leg.problem.goal for leg in self.legs or (self,)]
+        return np.array([self.problem.start, *ends])
+
+    @property
+    def via(self) -> Array:
+        """(k, 2): stops of the route between start and goal, map units; none without a route."""
+        return self.stops[1:-1] if self.path is not None else np.empty((0, 2))
+
+    @property
     def bounded(self) -> str:
         """What the lower bound speaks of, in words: "no path is shorter"."""
         which = " through these points" if self.legs else ""

@@ -87,8 +87,8 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     yield "status", f"{solution.status.value} ({solution.stopped_by})"
     yield "planner", solution.planner
     yield "start", _point(problem, problem.start)
-    for leg in solution.legs[:-1]:
-        yield "via", _point(problem, leg.problem.goal)
+    for x, y in solution.stops[1:-1]:
+        yield "via", _point(problem, (x, y))
     yield "goal", _point(problem, problem.goal)
     if surface.georeference is not None:
         yield "planned in", surface.georeference.name

@@ -72,7 +72,7 @@ def plan_goals(
     ]
     tour = _Tour(problem, planner, callback, len(ends))
     stops = [problem.start, *tour.checked(via)]
-    chords = [_chord([*stops, end], problem) for end in ends]
+    chords = [metric.chord_through(problem.surface, [*stops, end]) for end in ends]
     found: dict[int, GoalAnswer] = {}
     best, stopped = math.inf, False
     for k in sorted(range(len(ends)), key=chords.__getitem__):
@@ -110,12 +110,6 @@ def _openness(solution: Solution) -> int:
 
 def _goal_name(goals: Sequence[Any], k: int) -> str:
     return "goal" if len(goals) == 1 else f"goal {k + 1}"
-
-
-def _chord(stops: Sequence[Any], problem: Problem) -> float:
-    """A lower bound of every way through these points, map units."""
-    points = np.array(stops, np.float64)
-    return float(np.sum(metric.chord(problem.surface, points[:-1], points[1:])))
 
 
 def _least(chord: float, solution: Solution | None) -> float:

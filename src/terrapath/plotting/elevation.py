@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from ..io.routes.profile import Column, Slopes, further_layers, slopes
-from ..io.routes.record import via_points
 from ..problem import Path, Solution
 from ..validation import Array
 from .map_view import PATH_COLOUR
@@ -56,7 +55,7 @@ def _draw_layer(axes: Any, distance: Array, shown: Column) -> None:
 
 def _mark_vias(axes: Any, solution: Solution, path: Path) -> None:
     """Where a leg ends: dashed lines, numbered on the first panel."""
-    for k, via in enumerate(via_points(solution), start=1):
+    for k, via in enumerate(solution.via, start=1):
         nearest = int(np.argmin(np.hypot(*(path.profile.points - via).T)))
         distance = path.profile.distance[nearest]
         for panel in axes:

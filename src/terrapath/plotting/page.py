@@ -15,7 +15,6 @@ from ..errors import MapError
 from ..files import written_whole
 from ..free_space import sort_obstacles
 from ..io.routes.profile import clean, slopes
-from ..io.routes.record import via_points
 from ..io.routes.units import height_scale
 from ..problem import Path as Route
 from ..problem import Solution
@@ -238,7 +237,7 @@ def _marks(stage: Stage) -> list[Any]:
     """Start, via points and goal."""
     import plotly.graph_objects as go
 
-    problem, via = stage.solution.problem, via_points(stage.solution)
+    problem, via = stage.solution.problem, stage.solution.via
     marks = [("start", np.array([problem.start]), "#0b6e4f", "circle")]
     if len(via):
         marks.append(("via", via, "#ffffff", "square"))

@@ -11,7 +11,7 @@ from ...problem import Solution
 from ...surface import Surface
 from ...validation import Array
 from .places import DECIMALS, Part, in_degrees, parts_in_degrees
-from .record import dump, summary, via_points
+from .record import dump, summary
 
 
 def _frame(surface: Surface) -> str:
@@ -51,7 +51,7 @@ def _vias(points: Array, places: Array) -> list[dict[str, Any]]:
 def write(solution: Solution, file: Path) -> None:
     """A collection: the route, and its via points where there are any."""
     assert solution.path is not None
-    surface, points, via = solution.problem.surface, solution.path.points, via_points(solution)
+    surface, points, via = solution.problem.surface, solution.path.points, solution.via
     reference, height = surface.georeference, surface.layers[0]
     if reference is None:
         parts, via_places = [Part(points, points)], via

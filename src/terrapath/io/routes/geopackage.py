@@ -14,7 +14,7 @@ import numpy as np
 
 from ...problem import Solution
 from .profile import clean, distinct, profile_columns
-from .record import dump, summary, via_points
+from .record import dump, summary
 
 # GDAL stamps a file with the day it is written; the same route should give the same bytes.
 EPOCH = "1970-01-01T00:00:00.000Z"
@@ -68,13 +68,12 @@ def _layers(solution: Solution) -> dict[str, Any]:
     columns = profile_columns(solution)
     names = distinct([column.heading for column in columns], RESERVED)
     data = {name: column.values for name, column in zip(names, columns, strict=True)}
-    via = via_points(solution)
-    ends = shapely.points(np.concatenate([[problem.start], via, [problem.goal]]))
-    roles = ["start", *["via"] * len(via), "goal"]
+    stops = shapely.points(solution.stops)
+    roles = ["start", *["via"] * len(solution.via), "goal"]
     return {
         "route": gpd.GeoDataFrame(_attributes(solution), geometry=[path.line], crs=crs),
         "points": gpd.GeoDataFrame(data, geometry=shapely.points(path.profile.points), crs=crs),
-        "waypoints": gpd.GeoDataFrame({"role": roles}, geometry=ends, crs=crs),
+        "waypoints": gpd.GeoDataFrame({"role": roles}, geometry=stops, crs=crs),
     }
 
 

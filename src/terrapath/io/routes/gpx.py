@@ -15,7 +15,6 @@ from ...surface.georeference import Georeference
 from ...validation import Array
 from .places import DECIMALS, in_degrees
 from .profile import clean
-from .record import via_points
 from .units import height_metres
 
 
@@ -61,11 +60,11 @@ def write(solution: Solution, file: Path) -> None:
     from gpxpy import gpx
 
     assert solution.path is not None
-    problem, surface, via = solution.problem, solution.problem.surface, via_points(solution)
+    problem, surface = solution.problem, solution.problem.surface
     document = gpx.GPX()
     document.creator = f"terrapath {__version__}"
-    names = ["start", *(f"via {k}" for k in range(1, len(via) + 1)), "goal"]
-    stops = _places(surface, np.concatenate([[problem.start], via, [problem.goal]]))
+    names = ["start", *(f"via {k}" for k in range(1, len(solution.via) + 1)), "goal"]
+    stops = _places(surface, solution.stops)
     document.waypoints = [
         gpx.GPXWaypoint(name=name, **place) for name, place in zip(names, stops, strict=True)
     ]

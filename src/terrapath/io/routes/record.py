@@ -11,7 +11,6 @@ import numpy as np
 
 from ... import __version__
 from ...problem import Solution
-from ...validation import Array
 
 
 def plain(value: Any) -> Any:
@@ -32,12 +31,6 @@ def plain(value: Any) -> Any:
 def dump(record: Any, indent: int | None = None) -> str:
     """Strict JSON; letters that no encoding can hold stay escaped."""
     return json.dumps(plain(record), allow_nan=False, indent=indent) + "\n"
-
-
-def via_points(solution: Solution) -> Array:
-    """(k, 2): where one leg ends and the next begins, map units; empty for a single leg."""
-    ends = [leg.problem.goal for leg in solution.legs[:-1] if solution.path is not None]
-    return np.array(ends, np.float64).reshape(-1, 2)
 
 
 def provenance(solution: Solution) -> dict[str, Any]:
@@ -123,7 +116,7 @@ def route_record(solution: Solution) -> dict[str, Any]:
         "seconds": solution.seconds,
         "start": problem.start,
         "goal": problem.goal,
-        "via": via_points(solution),
+        "via": solution.via,
         "path": None if path is None else path.points,
         "stopped_by": solution.stopped_by,
         "counters": solution.counters,
