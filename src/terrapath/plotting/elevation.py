@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import FuncFormatter
 
 from ..io.routes.profile import Column, Slopes, further_layers, slopes
 from ..problem import Path, Solution
 from ..validation import Array
+from .labels import AxisUnit, with_unit
 from .map_view import PATH_COLOUR
-from .terrain import with_unit
 
 HEIGHT_COLOUR, GROUND_COLOUR, LIMIT_COLOUR = "#6b5b3e", "#9a9a9a", "#8a2be2"
 LAYER_COLOUR = "#0b6e4f"
@@ -79,12 +78,9 @@ def draw_charts(figure: Any, solution: Solution, path: Path) -> None:
     for panel, shown in zip(axes[2:], more, strict=True):
         _draw_layer(panel, distance, shown)
     _mark_vias(axes, solution, path)
-    unit = problem.surface.unit
-    kilometres = unit == "m" and distance[-1] >= 10_000.0
-    if kilometres:
-        axes[-1].xaxis.set_major_formatter(FuncFormatter(lambda at, _: f"{at / 1000.0:g}"))
-    unit_shown = f" ({'km' if kilometres else unit})" if unit else ""
-    axes[-1].set_xlabel(f"distance along the surface{unit_shown}")
+    unit = AxisUnit.for_lengths(distance[-1], problem.surface.unit)
+    unit.apply(axes[-1].xaxis)
+    axes[-1].set_xlabel(unit.label("distance along the surface"))
     axes[-1].set_xlim(0.0, distance[-1] or 1.0)
     for panel in axes:
         panel.grid(alpha=0.3)

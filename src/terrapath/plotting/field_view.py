@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from ..eikonal import DistanceField
 from ..problem import Problem
 from ..validation import Array
+from .labels import AxisUnit
 from .map_view import draw_ground, draw_start
 
 LINES = 24
@@ -38,14 +39,12 @@ def _draw_lines(axes: Any, field: DistanceField, values: Array, unit: str) -> No
     lines = axes.contour(lattice.x, lattice.y, values, zorder=4, **style)
     halo = patheffects.withStroke(linewidth=2.4, foreground="white", alpha=0.8)
     lines.set_path_effects([halo])
-    kilometres = unit == "m" and float(values.max()) >= 10_000.0
-    labels = lines.clabel(fontsize=8, fmt=lambda at: f"{at / 1000.0 if kilometres else at:g}")
-    for text in labels:
+    shown = AxisUnit.for_lengths(float(values.max()), unit)
+    for text in lines.clabel(fontsize=8, fmt=shown.format):
         text.set(color="black", path_effects=[halo])
-    label = f"distance ({'km' if kilometres else unit})".replace(" ()", "")
+    label = shown.label("distance")
     bar = axes.figure.colorbar(lines, ax=axes, label=label, shrink=0.72, pad=0.02)
-    if kilometres:
-        bar.ax.yaxis.set_major_formatter(lambda level, _: f"{level / 1000.0:g}")
+    shown.apply(bar.ax.yaxis)
 
 
 def _hatch(axes: Any, field: DistanceField) -> None:

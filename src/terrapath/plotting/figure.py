@@ -14,9 +14,9 @@ from ..files import written_whole
 from ..problem import Solution
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
+from .labels import format_length, in_words
 from .map_view import draw_map
 from .perspective import draw_perspective
-from .terrain import format_length, in_words
 
 DOTS_PER_INCH = 140
 PANEL_WIDTH = 5.4  # inches

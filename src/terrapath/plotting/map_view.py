@@ -17,7 +17,8 @@ from shapely import LineString, Point, Polygon
 
 from ..free_space import Parts, sort_obstacles
 from ..problem import Problem, Solution
-from .terrain import LAYER_COLOURS, Terrain, format_length, height_colours, label_axes
+from .labels import format_length, label_axes
+from .terrain import LAYER_COLOURS, Terrain, height_colours
 
 SAMPLES = 500
 CONTOURS = 14

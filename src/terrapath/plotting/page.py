@@ -19,8 +19,9 @@ from ..io.routes.units import height_scale
 from ..problem import Path as Route
 from ..problem import Solution
 from ..validation import Array
+from .labels import format_length
 from .map_view import ALTERNATIVE_COLOURS, PATH_COLOUR
-from .terrain import LAYER_COLOURS, Terrain, format_length, height_colours
+from .terrain import LAYER_COLOURS, Terrain, height_colours
 
 ENDING = ".html"
 SAMPLES = 300  # of the terrain, along the longer side

@@ -12,8 +12,9 @@ from scipy.ndimage import map_coordinates
 
 from ..problem import Solution
 from ..validation import Array
+from .labels import label_axes
 from .map_view import MARGIN_COLOUR, OBSTACLE_COLOUR, PATH_COLOUR, STEEP_COLOUR
-from .terrain import LAYER_COLOURS, Terrain, height_colours, label_axes
+from .terrain import LAYER_COLOURS, Terrain, height_colours
 
 SAMPLES = 180
 ELEVATION, AZIMUTH = 42.0, -115.0  # degrees: where the viewer stands

@@ -1,4 +1,4 @@
-"""A surface sampled for drawing: values, hill shade, colours, and units for the axes."""
+"""A surface sampled for drawing: values, hill shade, colours."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ import numpy.typing as npt
 import shapely
 from matplotlib import colormaps
 from matplotlib.colors import LightSource, Normalize
-from matplotlib.ticker import FuncFormatter
 
 from ..free_space import Circle, sort_obstacles
-from ..io.routes.profile import clean
 from ..problem import Problem
 from ..surface import Mask
 from ..validation import Array
+from .labels import with_unit
 
 Cells: TypeAlias = npt.NDArray[np.bool_]
 
@@ -144,35 +143,8 @@ class Terrain:
         return np.clip(np.asarray(lit, np.float64), 0.0, 1.0)
 
 
-def in_words(text: str) -> str:
-    """A name that came with a map, for matplotlib, to which dollar signs are mathematics."""
-    return clean(text).replace("$", r"\$")
-
-
-def with_unit(name: str, unit: str, gap: str = " ") -> str:
-    """A name with its unit, as axes show it."""
-    return f"{in_words(name)}{gap}({in_words(unit)})" if unit else in_words(name)
-
-
 def height_colours() -> Any:
     """The part of the colour map that heights are drawn in."""
     from matplotlib.colors import ListedColormap
 
     return ListedColormap(colormaps[HEIGHT_COLOURS](np.linspace(0.22, 0.90, 256)))
-
-
-def format_length(length: float, unit: str) -> str:
-    """A length with its unit, as titles and legends show it."""
-    return f"{length:{'.4f' if length < 1000.0 else ',.0f'}} {unit}".rstrip()
-
-
-def label_axes(axes: Any, problem: Problem) -> None:
-    """Axis labels with units; kilometres where metres would be long."""
-    unit = problem.surface.unit
-    if unit == "m" and max(problem.bounds.width, problem.bounds.height) >= 10_000.0:
-        unit = "km"
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 1000.0:g}"))
-    suffix = f" ({unit})" if unit else ""
-    axes.set_xlabel(f"$x_1${suffix}")
-    axes.set_ylabel(f"$x_2${suffix}")

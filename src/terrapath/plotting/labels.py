@@ -1,0 +1,62 @@
+"""Names, units and lengths as axes, titles and legends show them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from ..io.routes.profile import clean
+from ..problem import Problem
+
+# Axes that are longer are in kilometres, metres.
+LONGEST_IN_METRES = 10_000.0
+
+
+def in_words(text: str) -> str:
+    """A name that came with a map, for matplotlib, to which dollar signs are mathematics."""
+    return clean(text).replace("$", r"\$")
+
+
+def with_unit(name: str, unit: str, gap: str = " ") -> str:
+    """A name with its unit, as axes show it."""
+    return f"{in_words(name)}{gap}({in_words(unit)})" if unit else in_words(name)
+
+
+def format_length(length: float, unit: str) -> str:
+    """A length with its unit, as titles and legends show it."""
+    return f"{length:{'.4f' if length < 1000.0 else ',.0f'}} {unit}".rstrip()
+
+
+class AxisUnit(NamedTuple):
+    """The unit that an axis of lengths is in."""
+
+    name: str
+    size: float  # map units
+
+    @classmethod
+    def for_lengths(cls, longest: float, unit: str) -> AxisUnit:
+        """Kilometres where metres would be long, else the map's unit."""
+        is_long = unit == "m" and longest >= LONGEST_IN_METRES
+        return cls("km", 1000.0) if is_long else cls(unit, 1.0)
+
+    def format(self, length: float, place: int | None = None) -> str:
+        """A number of the axis, its length given in map units; ``place`` is matplotlib's."""
+        return f"{length / self.size:g}"
+
+    def label(self, name: str) -> str:
+        """What the axis is called."""
+        return f"{name} ({self.name})" if self.name else name
+
+    def apply(self, axis: Any) -> None:
+        """Have an axis, of map units, number itself in this one."""
+        if self.size != 1.0:
+            axis.set_major_formatter(self.format)
+
+
+def label_axes(axes: Any, problem: Problem) -> None:
+    """Axis labels with units; kilometres where metres would be long."""
+    longer = max(problem.bounds.width, problem.bounds.height)
+    shown = AxisUnit.for_lengths(longer, problem.surface.unit)
+    for axis in (axes.xaxis, axes.yaxis):
+        shown.apply(axis)
+    axes.set_xlabel(shown.label("$x_1$"))
+    axes.set_ylabel(shown.label("$x_2$"))
