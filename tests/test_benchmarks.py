@@ -30,10 +30,9 @@ from terrapath.experiments.benchmarks.timing import (
     Target,
     Timing,
     percent,
-    rebuilt,
 )
 from terrapath.experiments.runner import Runner
-from terrapath.experiments.trials import Store
+from terrapath.experiments.trials import Store, rebuilt
 
 TINY = Scale(
     scenes=("one-peak",),

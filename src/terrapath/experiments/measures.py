@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -42,11 +41,6 @@ class PathTrial(Trial[PlannedPath]):
             raise InputError(f"{self.planner} found no path on {self.scene}; give it more samples")
         points = tuple((float(x), float(y)) for x, y in solution.path.points)
         return PlannedPath(solution.length, solution.cost, points)
-
-    def decode(self, record: dict[str, Any]) -> PlannedPath:
-        """The path from the fields that were stored."""
-        points = tuple((x, y) for x, y in record["points"])
-        return PlannedPath(record["length"], record["cost"], points)
 
 
 @dataclass(frozen=True)
@@ -94,14 +88,6 @@ class FanTrial(Trial[FanSummary]):
         length = None if fan.paper_length is None else float(fan.paper_length)
         return FanSummary(int(fan.near.sum()), length, tuple(map(_exact, fan.geodesics)))
 
-    def decode(self, record: dict[str, Any]) -> FanSummary:
-        """The fan from the fields that were stored."""
-        exact = tuple(
-            ExactGeodesic(**{**g, "conjugate_points": tuple(g["conjugate_points"])})
-            for g in record["geodesics"]
-        )
-        return FanSummary(**{**record, "geodesics": exact})
-
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
@@ -148,7 +134,3 @@ class SweepTrial(Trial[SweepSummary]):
         rays = self.planner.rays(self.problem)
         movement = tuple(abs(float(ray.jacobi[-1])) for ray in rays)
         return SweepSummary(tuple(ray.angle for ray in rays), movement)
-
-    def decode(self, record: dict[str, Any]) -> SweepSummary:
-        """The sweep from the fields that were stored."""
-        return SweepSummary(tuple(record["angles"]), tuple(record["movement"]))

@@ -9,7 +9,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from types import UnionType
+from typing import Any, ClassVar, Generic, TypeVar, get_args, get_origin, get_type_hints
 
 from .. import scenes
 from ..files import written_whole
@@ -28,6 +29,26 @@ def digest(record: Any) -> str:
     return hashlib.sha256(canonical(record).encode()).hexdigest()
 
 
+def rebuilt(kind: Any, record: Any) -> Any:
+    """What ``dataclasses.asdict`` made a record of, from its JSON.
+
+    kind : a dataclass whose fields are numbers, texts, dataclasses, tuples of one kind, or
+    one of these or None.
+    """
+    if record is None:
+        return None
+    if get_origin(kind) is UnionType:
+        kind = next(choice for choice in get_args(kind) if choice is not type(None))
+    if get_origin(kind) is tuple:
+        return tuple(rebuilt(get_args(kind)[0], item) for item in record)
+    if not dataclasses.is_dataclass(kind):
+        return record
+    hints = get_type_hints(kind)
+    fields = {field.name: record[field.name] for field in dataclasses.fields(kind)}
+    made: Any = kind
+    return made(**{name: rebuilt(hints[name], value) for name, value in fields.items()})
+
+
 @cache
 def _scene_settings(name: str) -> dict[str, Any]:
     """All numbers that make a scene, so that a changed scene has other trials."""
@@ -44,10 +65,18 @@ def _scene_settings(name: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Trial(ABC, Generic[Result]):
-    """One planner on one scene: everything that its result depends on."""
+    """One planner on one scene: everything that its result depends on.
+
+    Its result is a dataclass, the one that a subclass names in ``Trial[...]``.
+    """
 
     scene: str
     planner: Any
+    _kind: ClassVar[Any]  # of results
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        (cls._kind,) = get_args(cls.__orig_bases__[0])  # type: ignore[attr-defined]
 
     @cached_property
     def settings(self) -> dict[str, Any]:
@@ -72,9 +101,10 @@ class Trial(ABC, Generic[Result]):
     def measure(self) -> Result:
         """Run it."""
 
-    @abstractmethod
     def decode(self, record: dict[str, Any]) -> Result:
         """The result from the fields that were stored."""
+        found: Result = rebuilt(self._kind, record)
+        return found
 
 
 class Store:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from ...bounding import lower_bound
 from ...certificate import Certificate
 from ..runner import Runner
 from ..trials import Trial
 from .settings import Scale, true_length
-from .timing import Reading, Stopwatch, Target, Timing, percent, rebuilt, timed
+from .timing import Reading, Stopwatch, Target, Timing, percent, timed
 
 # The length that is told to the search: the true one, and not less.
 KNOWN = 1.0 + 1e-9
@@ -96,11 +95,6 @@ class BoundTrial(Trial[BoundFound]):
             Timing.of(reading for _, reading in seen),
             Timing.of(checks),
         )
-
-    def decode(self, record: dict[str, Any]) -> BoundFound:
-        """The steps from the fields that were stored."""
-        found: BoundFound = rebuilt(BoundFound, record)
-        return found
 
 
 BoundData = dict[str, BoundFound]

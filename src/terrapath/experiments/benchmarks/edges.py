@@ -20,7 +20,7 @@ from ..trials import Trial
 from .exchange import write_problem
 from .programs import EDGES_LOOP
 from .settings import Scale
-from .timing import Reading, Target, Timing, rebuilt, timed
+from .timing import Reading, Target, Timing, timed
 
 SPLINE_TARGET = 150.0  # nanoseconds an edge
 PEAKS_TARGET = 1.0  # times the seconds of the loop in C++
@@ -104,11 +104,6 @@ class EdgesTrial(Trial[EdgesFound]):
             return EdgesFound(Timing.of(ours), None, None)
         difference = float(np.max(np.abs(lengths - loops) / np.maximum(lengths, 1e-300)))
         return EdgesFound(Timing.of(ours), Timing.of(theirs), difference)
-
-    def decode(self, record: dict[str, Any]) -> EdgesFound:
-        """The measures from the fields that were stored."""
-        found: EdgesFound = rebuilt(EdgesFound, record)
-        return found
 
     @property
     def settings(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from ..trials import Trial
 from .peers import POTPOURRI, PYGEODESIC, SCIKIT_IMAGE, Peer
 from .processes import run_fresh
 from .settings import Scale, true_length
-from .timing import Reading, Target, Timing, rebuilt, timed
+from .timing import Reading, Target, Timing, timed
 
 # Nodes on a side of what everything is done on once before.
 SMALL = 31
@@ -60,11 +60,6 @@ class GridTrial(Trial[GridFound]):
         task = {"scene": self.scene, **asdict(self.planner)}
         what = f"{self.planner.method} on {self.planner.nodes:,} nodes a side"
         return self.decode(run_fresh("grids", task, what))
-
-    def decode(self, record: dict[str, Any]) -> GridFound:
-        """The measures from the fields that were stored."""
-        found: GridFound = rebuilt(GridFound, record)
-        return found
 
 
 # Methods: each takes the problem and a lattice, and returns what is timed, which in turn returns

@@ -17,7 +17,7 @@ from ..runner import Runner
 from ..trials import Trial
 from .processes import run_fresh
 from .settings import Scale
-from .timing import Target, Timing, rebuilt, timed
+from .timing import Target, Timing, timed
 
 GROWTH_TARGET = 13.0  # times the seconds for ten times the samples
 BYTES_TARGET = 200.0  # a sample
@@ -82,11 +82,6 @@ class GrowthTrial(Trial[GrowthFound]):
         """Start the process and read what it prints."""
         task = {"scene": self.scene, **asdict(self.planner)}
         return self.decode(run_fresh("growth", task, f"{self.planner.samples:,} samples"))
-
-    def decode(self, record: dict[str, Any]) -> GrowthFound:
-        """The measures from the fields that were stored."""
-        found: GrowthFound = rebuilt(GrowthFound, record)
-        return found
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from ..runner import Runner
 from ..trials import Trial
 from .processes import run_fresh
 from .settings import Scale
-from .timing import Reading, Target, Timing, rebuilt, timed
+from .timing import Reading, Target, Timing, timed
 
 GIGABYTES_TARGET, TARGET_CELLS = 6.0, 10_000  # of a map with so many cells a side
 
@@ -79,11 +79,6 @@ class LargeMapTrial(Trial[LargeMapFound]):
             task = {"path": str(path), **asdict(self.planner)}
             what = f"planning on {self.planner.cells:,} cells a side"
             return self.decode(run_fresh("large_maps", task, what))
-
-    def decode(self, record: dict[str, Any]) -> LargeMapFound:
-        """The measures from the fields that were stored."""
-        found: LargeMapFound = rebuilt(LargeMapFound, record)
-        return found
 
 
 @dataclass(frozen=True)

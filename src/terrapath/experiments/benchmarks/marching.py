@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from ..runner import Runner
 from ..trials import Trial
 from .peers import SCIKIT_FMM
 from .processes import run_fresh
 from .settings import Scale, true_length
-from .timing import Target, Timing, rebuilt
+from .timing import Target, Timing
 
 # Seconds over scikit-fmm's on so many nodes a side; memory a node in bytes; the memory that a
 # lattice of so many nodes a side fits in.
@@ -79,11 +78,6 @@ class MarchTrial(Trial[Marched]):
         task = {"scene": self.scene, **asdict(self.planner)}
         what = f"fast marching on {self.planner.nodes:,} nodes a side"
         return self.decode(run_fresh("fresh", task, what))
-
-    def decode(self, record: dict[str, Any]) -> Marched:
-        """The measures from the fields that were stored."""
-        found: Marched = rebuilt(Marched, record)
-        return found
 
 
 @dataclass(frozen=True)

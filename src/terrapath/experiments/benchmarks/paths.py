@@ -13,7 +13,7 @@ from ...problem import Solution, Status
 from ..runner import Runner
 from ..trials import Trial
 from .settings import Scale, true_length
-from .timing import Reading, Target, Timing, percent, rebuilt, timed
+from .timing import Reading, Target, Timing, percent, timed
 
 # A path is near the truth when it is longer by no more than this share.
 NEAR = 1e-3
@@ -98,11 +98,6 @@ class PathsTrial(Trial[PathsFound]):
         if solution.length is None:
             raise InputError(f"{self.planner.label} found no path on {self.scene}")
         return solution.length
-
-    def decode(self, record: dict[str, Any]) -> PathsFound:
-        """The measures from the fields that were stored."""
-        found: PathsFound = rebuilt(PathsFound, record)
-        return found
 
 
 def contenders(scale: Scale) -> list[PathRuns]:

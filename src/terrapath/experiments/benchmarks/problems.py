@@ -17,7 +17,6 @@ from ...planners import plan
 from ...problem import Problem
 from ..runner import Runner
 from ..trials import Trial
-from .timing import rebuilt
 
 # Discs across the shortest path of three-peaks, and across the ways around them.
 DISCS = (
@@ -113,11 +112,6 @@ class OptimumTrial(Trial[Optimum]):
         if solution.length is None:
             raise TerrapathError(f"optimal found no path on {self.scene}: {solution.stopped_by}")
         return Optimum(solution.length, solution.gap)
-
-    def decode(self, record: dict[str, Any]) -> Optimum:
-        """The length from the fields that were stored."""
-        found: Optimum = rebuilt(Optimum, record)
-        return found
 
 
 def find_optimum(name: str, runs: OptimumRuns, runner: Runner) -> Optimum:

@@ -13,7 +13,7 @@ from ...errors import TerrapathError
 from ..runner import Runner
 from ..trials import Trial
 from .settings import Scale
-from .timing import Reading, Stopwatch, Target, Timing, rebuilt
+from .timing import Reading, Stopwatch, Target, Timing
 
 HELP, PLAN = ("--help",), ("plan", "six-peaks", "--json")
 COMMAND = "from terrapath.cli import main; main()"
@@ -70,11 +70,6 @@ class StartTrial(Trial[Started]):
             return run_afresh(self.planner.arguments, shared)
         with tempfile.TemporaryDirectory() as empty:
             return run_afresh(self.planner.arguments, empty)
-
-    def decode(self, record: dict[str, Any]) -> Started:
-        """The measures from the fields that were stored."""
-        found: Started = rebuilt(Started, record)
-        return found
 
 
 def run_afresh(arguments: tuple[str, ...], cache: str) -> Reading:

@@ -1,14 +1,12 @@
-"""Clocks, targets, and results as they come back from their files."""
+"""Clocks and targets."""
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from statistics import median
-from types import UnionType
-from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import NamedTuple, TypeVar
 
 Work = TypeVar("Work")
 
@@ -100,23 +98,3 @@ class Target:
 def percent(share: float) -> str:
     """A share in percent, to three digits."""
     return f"{100.0 * share:.3g} %"
-
-
-def rebuilt(kind: Any, record: Any) -> Any:
-    """What ``dataclasses.asdict`` made a record of, from its JSON.
-
-    kind : a dataclass whose fields are numbers, texts, dataclasses, tuples of one kind, or
-    one of these or None.
-    """
-    if record is None:
-        return None
-    if get_origin(kind) is UnionType:
-        kind = next(choice for choice in get_args(kind) if choice is not type(None))
-    if get_origin(kind) is tuple:
-        return tuple(rebuilt(get_args(kind)[0], item) for item in record)
-    if not dataclasses.is_dataclass(kind):
-        return record
-    hints = get_type_hints(kind)
-    fields = {field.name: record[field.name] for field in dataclasses.fields(kind)}
-    made: Any = kind
-    return made(**{name: rebuilt(hints[name], value) for name, value in fields.items()})

@@ -19,7 +19,7 @@ from .problems import Optimum, OptimumRuns, find_optimum, load_problem, problem_
 from .processes import run_fresh
 from .programs import OMPL_PLANNERS, Program
 from .settings import Scale
-from .timing import Target, Timing, percent, rebuilt, timed
+from .timing import Target, Timing, percent, timed
 
 TERRAPATH, CPP, PYTHON = "terrapath", "ompl-cpp", "ompl-python"
 
@@ -112,11 +112,6 @@ class TreeTrial(Trial[Curve]):
         task = {"scene": self.scene, **asdict(self.planner)}
         what = f"{self.planner.planner} of OMPL through Python on {self.scene}"
         return run_fresh("ompl_python", task, what, 10.0 * self.planner.last + LOADING)
-
-    def decode(self, record: dict[str, Any]) -> Curve:
-        """The curve from the fields that were stored."""
-        found: Curve = rebuilt(Curve, record)
-        return found
 
 
 @dataclass(frozen=True, kw_only=True)
