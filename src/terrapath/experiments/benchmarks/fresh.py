@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -16,6 +13,7 @@ from ...memory import forget_peak, peak_memory
 from ...problem import Problem
 from .marching import Marched, MarchRuns
 from .peers import SCIKIT_FMM
+from .processes import answer
 from .timing import Reading, Timing, timed
 
 # Nodes on a side of the lattice that everything is compiled on.
@@ -92,12 +90,5 @@ def measure_marching(scene: str, runs: MarchRuns) -> Marched:
     return Marched(stencils, readers, march, peer, distance, before, peak)
 
 
-def main(task: str) -> None:
-    """Measure and print the result as JSON. task : scene and settings, JSON."""
-    options = json.loads(task)
-    scene = options.pop("scene")
-    print(json.dumps(asdict(measure_marching(scene, MarchRuns(**options)))))
-
-
 if __name__ == "__main__":
-    main(sys.argv[1])
+    answer(lambda scene, **runs: measure_marching(scene, MarchRuns(**runs)))

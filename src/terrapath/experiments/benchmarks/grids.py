@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -18,7 +16,7 @@ from ...validation import Array
 from ..runner import Runner
 from ..trials import Trial
 from .peers import POTPOURRI, PYGEODESIC, SCIKIT_IMAGE, Peer
-from .processes import run_fresh
+from .processes import answer, run_fresh
 from .settings import Scale, true_length
 from .timing import Reading, Target, Timing, timed
 
@@ -263,12 +261,5 @@ def measure_grid(scene: str, runs: GridRuns) -> GridFound:
     return GridFound(Timing.of(laps), distance)
 
 
-def main(task: str) -> None:
-    """Measure and print the result as JSON. task : scene and settings, JSON."""
-    options = json.loads(task)
-    scene = options.pop("scene")
-    print(json.dumps(asdict(measure_grid(scene, GridRuns(**options)))))
-
-
 if __name__ == "__main__":
-    main(sys.argv[1])
+    answer(lambda scene, **runs: measure_grid(scene, GridRuns(**runs)))

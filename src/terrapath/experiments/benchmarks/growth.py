@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -15,7 +13,7 @@ from ...problem import Problem
 from ...surface import Surface
 from ..runner import Runner
 from ..trials import Trial
-from .processes import run_fresh
+from .processes import answer, run_fresh
 from .settings import Scale
 from .timing import Target, Timing, timed
 
@@ -162,12 +160,5 @@ def measure_growth(scene: str, runs: GrowthRuns) -> GrowthFound:
     return GrowthFound(Timing.of(laps), length, vertices, before, peak)
 
 
-def main(task: str) -> None:
-    """Measure and print the result as JSON. task : ground and settings, JSON."""
-    options = json.loads(task)
-    scene = options.pop("scene")
-    print(json.dumps(asdict(measure_growth(scene, GrowthRuns(**options)))))
-
-
 if __name__ == "__main__":
-    main(sys.argv[1])
+    answer(lambda scene, **runs: measure_growth(scene, GrowthRuns(**runs)))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -21,7 +19,7 @@ from ...planners import make_finished
 from ...problem import Problem
 from ..runner import Runner
 from ..trials import Trial
-from .processes import run_fresh
+from .processes import answer, run_fresh
 from .settings import Scale
 from .timing import Reading, Target, Timing, timed
 
@@ -176,12 +174,5 @@ def measure_large_map(path: str, runs: LargeMapRuns) -> LargeMapFound:
     )
 
 
-def main(task: str) -> None:
-    """Measure and print the result as JSON. task : path and settings, JSON."""
-    options = json.loads(task)
-    path = options.pop("path")
-    print(json.dumps(asdict(measure_large_map(path, LargeMapRuns(**options)))))
-
-
 if __name__ == "__main__":
-    main(sys.argv[1])
+    answer(lambda path, **runs: measure_large_map(path, LargeMapRuns(**runs)))

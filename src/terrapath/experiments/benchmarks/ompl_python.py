@@ -6,9 +6,7 @@ measures edges by Line-R with NumPy.
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -19,6 +17,7 @@ from ...problem import Problem
 from ...validation import Array
 from .exchange import discs_of, panel_of
 from .problems import load_problem
+from .processes import answer
 from .timing import Stopwatch
 
 # Boole's weights, but for panels' ends that two of them share.
@@ -218,12 +217,5 @@ def looks(problem: Problem, task: dict[str, Any]) -> list[dict[str, Any]]:
         following = min(following * task["growth"], task["last"])
 
 
-def main(task: str) -> None:
-    """Plan and print the looks as JSON. task : scene and settings, JSON."""
-    options = json.loads(task)
-    problem = load_problem(options["scene"])
-    print(json.dumps({"looks": looks(problem, options)}))
-
-
 if __name__ == "__main__":
-    main(sys.argv[1])
+    answer(lambda **task: {"looks": looks(load_problem(task["scene"]), task)})

@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 from ...errors import TerrapathError
@@ -32,3 +34,9 @@ def run_fresh(module: str, task: dict[str, Any], what: str, timeout: float | Non
         raise TerrapathError(f"{what} ended with code {done.returncode}: {lines[-1]}")
     # Libraries may greet first.
     return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def answer(measure: Callable[..., Any]) -> None:
+    """In such a process: print as JSON what is measured of the task's entries, by their names."""
+    found = measure(**json.loads(sys.argv[1]))
+    print(json.dumps(found, default=asdict))
