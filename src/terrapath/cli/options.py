@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..options import (
-    Declared,
+from ..options.listing import Declared, options
+from ..options.sections import (
     Extent,
     Files,
     LayerTable,
@@ -20,7 +20,6 @@ from ..options import (
     Points,
     Rectangle,
     Weights,
-    options,
 )
 
 Where = Annotated[

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..errors import InputError
-from ..options import Point, Scenario
+from ..options.scenario import Scenario
+from ..options.sections import Point
 from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options

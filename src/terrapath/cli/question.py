@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InputError
-from ..options import MapSection, Point, Rectangle, Scenario
+from ..options.scenario import Scenario
+from ..options.sections import MapSection, Point, Rectangle
 from .options import is_scenario
 
 if TYPE_CHECKING:

@@ -1,69 +1,19 @@
-"""Every option of ``terrapath plan``: name, type, default and help, each said once.
-
-The command line, scenario files, their JSON Schema and what ``terrapath init`` writes are all
-made of these declarations. Nothing heavy is imported here: typer reads them to print the
-help, pydantic only where a file is read.
-"""
+"""The options, a dataclass for each section of a scenario file."""
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, TypeAlias, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+
+from .option import A_POINT, COUNT, FILE, FILES, NUMBER, STRICT, SWITCH, TEXT, WHOLE, Option
 
 Point: TypeAlias = tuple[float, float]
 Points: TypeAlias = tuple[Point, ...]
 Rectangle: TypeAlias = tuple[float, float, float, float]
 Files: TypeAlias = tuple[str, ...]
 Extent: TypeAlias = float | Literal["auto", "none"]
-
-# How pydantic reads a section: unknown keys are errors, and so are NaN and infinity.
-STRICT: dict[str, Any] = {"extra": "forbid", "allow_inf_nan": False}
-
-
-@dataclass(frozen=True)
-class Option:
-    """What is said of an option beside its name, type and default.
-
-    expects : what a scenario file has to give, in words. form : what stands for the value on
-    the command line. flags : there, where they are not made of the key. example : as TOML,
-    for an option without a default. is_file : the text names a file.
-    """
-
-    help: str
-    expects: str
-    form: str | None = None
-    flags: tuple[str, ...] = ()
-    example: str = ""
-    is_file: bool = False
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        schema = handler(source)
-        _forbid_conversion(schema)
-        return schema
-
-    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> Any:
-        return handler(schema) | {"description": self.help}
-
-
-def _forbid_conversion(schema: Any) -> None:
-    """No number from text, no whole number from a fraction, no number from true."""
-    if isinstance(schema, dict):
-        if schema.get("type") in {"float", "int", "bool", "str"}:
-            schema["strict"] = True
-        for part in schema.values():
-            _forbid_conversion(part)
-    elif isinstance(schema, list | tuple):
-        for part in schema:
-            _forbid_conversion(part)
-
-
-NUMBER, WHOLE, SWITCH, TEXT = "a finite number", "a whole number", "true or false", "text"
-FILE, FILES = "the path of a file, as text", "a list of paths, each as text"
-A_POINT = "two finite numbers, [X, Y]"
-COUNT: Any = functools.partial(Option, expects=WHOLE, form="N")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -481,40 +431,6 @@ class OutputSection:
     ] = False
 
 
-@dataclass(frozen=True, kw_only=True)
-class Scenario:
-    """A question to Terrapath: all that ``terrapath plan`` can be told."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
-
-    map: MapSection = field(default_factory=MapSection)
-    route: RouteSection = field(default_factory=RouteSection)
-    constraints: ConstraintsSection = field(default_factory=ConstraintsSection)
-    planner: PlannerSection = field(default_factory=PlannerSection)
-    output: OutputSection = field(default_factory=OutputSection)
-
-    def files(self) -> Iterator[str]:
-        """All files that are named, to be read or written."""
-        for entry in options():
-            value = getattr(getattr(self, entry.section), entry.key)
-            if entry.option.is_file and value:
-                yield from [value] if isinstance(value, str) else value
-        for table in (*self.map.layers.values(), *self.map.costs.values()):
-            yield table.file
-
-    def overridden(self, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
-        """With the values given, by section and key; tables are merged name by name."""
-        changed = {}
-        for name, values in given.items():
-            section = getattr(self, name)
-            merged = {
-                key: {**getattr(section, key), **value} if isinstance(value, dict) else value
-                for key, value in values.items()
-            }
-            changed[name] = dataclasses.replace(section, **merged)
-        return dataclasses.replace(self, **changed)
-
-
 SECTIONS: Mapping[str, type] = {
     "map": MapSection,
     "route": RouteSection,
@@ -522,47 +438,3 @@ SECTIONS: Mapping[str, type] = {
     "planner": PlannerSection,
     "output": OutputSection,
 }
-
-
-class Declared(NamedTuple):
-    """An option with its place, as it was declared above."""
-
-    section: str
-    key: str
-    type: Any
-    default: Any
-    option: Option
-
-    @property
-    def parameter(self) -> str:
-        """Its name among the arguments of a command."""
-        return f"{self.section}_{self.key}"
-
-    @property
-    def flags(self) -> tuple[str, ...]:
-        """Its names on the command line; none where the command names it in another way."""
-        if self.key in {"path", "scene"}:
-            return ()
-        return self.option.flags or (f"--{self.key.replace('_', '-')}",)
-
-
-@functools.cache
-def declared(section: type) -> tuple[tuple[str, Any, Any, Option], ...]:
-    """Key, type, default and option of each field of a section, in order."""
-    hints = get_type_hints(section, include_extras=True)
-    return tuple(
-        (
-            entry.name,
-            hints[entry.name].__origin__,
-            entry.default if entry.default is not dataclasses.MISSING else {},
-            hints[entry.name].__metadata__[0],
-        )
-        for entry in dataclasses.fields(section)
-    )
-
-
-def options(*sections: str) -> Iterator[Declared]:
-    """The options of the sections, of all by default."""
-    for name in sections or SECTIONS:
-        for key, kind, default, option in declared(SECTIONS[name]):
-            yield Declared(name, key, kind, default, option)
