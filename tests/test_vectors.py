@@ -274,7 +274,7 @@ def test_files_that_are_not_there_rasters_and_absurd_sizes_are_refused(tmp_path,
         with rasterio.open(raster, "w", **profile) as dataset:
             dataset.write(np.zeros((1, 4, 4), np.uint8))
     assert "cannot be read as vectors" in refused(tp.read_obstacles, raster, SURFACE)
-    monkeypatch.setattr("terrapath.io.vectors.MOST_BYTES", 1000)
+    monkeypatch.setattr("terrapath.io.vectors.layers.MOST_BYTES", 1000)
     with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.geojson", b" " * 100_000)
     assert (tmp_path / "bomb.zip").stat().st_size < 1000

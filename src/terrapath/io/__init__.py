@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from .fields import write_field
     from .maps import LayerSource, read_surface
     from .routes import route_record, write_route
-    from .vectors import RepairedWarning, VectorWarning, read_area, read_obstacles
+    from .vectors import read_area, read_obstacles
+    from .vectors.layers import RepairedWarning, VectorWarning
 
 __all__ = [
     "LayerSource",
@@ -29,8 +30,8 @@ __all__ = [
 # Each name, and the module it lives in.
 _HOMES = {
     "LayerSource": "maps",
-    "RepairedWarning": "vectors",
-    "VectorWarning": "vectors",
+    "RepairedWarning": "vectors.layers",
+    "VectorWarning": "vectors.layers",
     "read_area": "vectors",
     "read_obstacles": "vectors",
     "read_surface": "maps",

@@ -1,0 +1,201 @@
+"""The layers of a vector file, checked and repaired."""
+
+from __future__ import annotations
+
+import warnings
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+from shapely.geometry.base import BaseGeometry
+
+from ...errors import MapError, TerrapathWarning
+from ...free_space import Geometries, Indices, simple_parts
+
+FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
+MOST_BYTES = 4 * 2**30
+
+
+class VectorWarning(TerrapathWarning):
+    """A vector file was not taken as it stands: something was assumed, or left out."""
+
+
+class RepairedWarning(VectorWarning):
+    """Geometries of a vector file were not valid, and have been repaired."""
+
+
+def tell(category: type[Warning], text: str) -> None:
+    """Warn, at the caller."""
+    warnings.warn(text, category, stacklevel=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """The geometries of a layer as the file has them, none empty. numbers : of their features."""
+
+    label: str
+    driver: str
+    crs: CRS | None
+    shapes: Geometries  # (m,)
+    numbers: Indices  # (m,)
+
+
+def read_layers(path: Path) -> Iterator[Layer]:
+    """The layers of a file that hold geometries, checked and repaired."""
+    source, names = _listed(path)
+    layers = [
+        layer
+        for name in names
+        for layer in [_read_layer(source, name, alone=len(names) == 1)]
+        if layer is not None
+    ]
+    if not layers:
+        raise MapError(f"{path} holds no features with a geometry; check that it is the right file")
+    yield from map(repaired, layers)
+
+
+def _listed(path: Path) -> tuple[Path, list[str]]:
+    """The file and the layers that are asked for."""
+    source, wanted = path, ""
+    if not path.exists():
+        file, _, wanted = str(path).rpartition(":")
+        source = Path(file)
+        if not file or not source.exists():
+            raise MapError(f"{path} does not exist; check the path")
+    _refuse_absurd_sizes(source)
+    import pyogrio
+
+    with quietly(source):
+        known = [(str(name), kind) for name, kind in pyogrio.list_layers(source)]
+    if wanted:
+        if wanted not in {name for name, _ in known}:
+            listed = ", ".join(name for name, _ in known)
+            raise MapError(f"{source} has no layer {wanted!r}; its layers are: {listed}")
+        return source, [wanted]
+    with_geometry = [name for name, kind in known if kind is not None]
+    if not with_geometry:
+        raise MapError(f"{source} holds no layer with geometries; give a file of polygons or lines")
+    return source, with_geometry
+
+
+def _refuse_absurd_sizes(path: Path) -> None:
+    """Before any memory is taken; what is packed counts as it will be unpacked."""
+    try:
+        files = [p for p in path.glob("*") if p.is_file()] if path.is_dir() else [path]
+        size = sum(file.stat().st_size for file in files)
+        if path.is_file() and zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:
+                size = sum(item.file_size for item in archive.infolist())
+    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+        raise MapError(f"{path} cannot be read: {reason_of(error)}") from None
+    if size > MOST_BYTES:
+        raise MapError(
+            f"{path} holds {size / 2**30:,.1f} GiB, more than {MOST_BYTES / 2**30:g} GiB; "
+            "cut out the part around the map"
+        )
+
+
+class quietly:  # noqa: N801 -- reads as a verb
+    """GDAL's complaints become one MapError, its warnings are not shown."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.caught = warnings.catch_warnings()
+
+    def __enter__(self) -> None:
+        self.caught.__enter__()
+        warnings.simplefilter("ignore")
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        self.caught.__exit__(kind, error, trace)
+        # Of a foreign file, drivers raise whatever they do.
+        if isinstance(error, Exception) and not isinstance(error, MapError):
+            raise MapError(
+                f"{self.path} cannot be read as vectors: {reason_of(error)}; check that it is a "
+                "vector file, and whole"
+            ) from None
+
+
+def reason_of(error: Exception) -> str:
+    """What an error says, on one short line."""
+    text = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+    return text.split("; ")[0][:200]
+
+
+def _read_layer(path: Path, name: str, *, alone: bool) -> Layer | None:
+    """One layer, without features that have no geometry; None where none has one."""
+    import pyogrio
+
+    label = str(path) if alone else f"{path}:{name}"
+    with quietly(path):
+        driver = pyogrio.read_info(
+            path, layer=name, force_feature_count=False, force_total_bounds=False
+        ).get("driver", "")
+        about, ids, packed, _ = pyogrio.raw.read(
+            path, layer=name, columns=[], force_2d=True, return_fids=True
+        )
+        shapes = np.empty(0, np.object_) if packed is None else shapely.from_wkb(packed)
+    crs = _parsed(about["crs"], label)
+    missing = shapely.is_missing(shapes) | shapely.is_empty(shapes)
+    if missing.all():
+        return None
+    if missing.any():
+        count = int(missing.sum())
+        tell(
+            VectorWarning,
+            f"{label}: without geometry and left out: {count} of {len(shapes)} features, the "
+            f"first is feature {ids[missing][0]}",
+        )
+    layer = Layer(label, driver, crs, shapes[~missing], ids[~missing])
+    require_places(layer, "a coordinate that is not finite, or on no map; mend or remove it")
+    return layer
+
+
+def _parsed(crs: Any, label: str) -> CRS | None:
+    if crs is None:
+        return None
+    try:
+        return CRS.from_user_input(crs)
+    except CRSError as error:
+        raise MapError(f"{label}: the CRS is not understood: {reason_of(error)}") from None
+
+
+def require_places(layer: Layer, what: str) -> None:
+    """Raise MapError where a coordinate is no place. what : is said of the feature."""
+    corners, owners = shapely.get_coordinates(layer.shapes, return_index=True)
+    bad = ~(np.abs(corners) < FARTHEST).all(axis=1)
+    if bad.any():
+        raise MapError(f"{layer.label}: feature {layer.numbers[owners[bad][0]]} has {what}")
+
+
+def repaired(layer: Layer) -> Layer:
+    """With valid geometries only. What the repair leaves of no extent is left out."""
+    reasons, broken = layer.shapes, np.flatnonzero(~shapely.is_valid(layer.shapes))
+    if len(broken) == 0:
+        return layer
+    with quietly(Path(layer.label)):
+        reason = shapely.is_valid_reason(reasons[broken[0]])
+        mended = shapely.make_valid(layer.shapes[broken], method="structure", keep_collapsed=True)
+    shapes = layer.shapes.copy()
+    shapes[broken] = [with_extent(shape) for shape in mended]
+    tell(
+        RepairedWarning,
+        f"{layer.label}: not valid, and repaired: {len(broken)} of {len(shapes)} geometries, the "
+        f"first is feature {layer.numbers[broken[0]]}: {reason}",
+    )
+    kept = ~shapely.is_empty(shapes)
+    return replace(layer, shapes=shapes[kept], numbers=layer.numbers[kept])
+
+
+def with_extent(shape: BaseGeometry) -> BaseGeometry:
+    """The polygons of a geometry, else its lines."""
+    parts, _ = simple_parts(np.array([shape], np.object_), np.zeros(1, np.int64))
+    dimensions = shapely.get_dimensions(parts)
+    parts = parts[dimensions == dimensions.max(initial=1)]
+    return parts[0] if len(parts) == 1 else shapely.union_all(parts)

@@ -1,0 +1,198 @@
+"""From a layer's CRS onto the plane that is planned in, so that straight edges stay right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+from pyproj import CRS, Transformer
+from pyproj.exceptions import ProjError
+from shapely.geometry.base import BaseGeometry
+
+from ...errors import InputError, MapError
+from ...free_space import POINTS, Geometries, outlines, simple_parts
+from ...surface import Surface
+from ...surface.georeference import Georeference
+from ...validation import Array, Bounds
+from .layers import (
+    Layer,
+    VectorWarning,
+    quietly,
+    reason_of,
+    repaired,
+    require_places,
+    tell,
+    with_extent,
+)
+
+# A straight edge of the file, bent by the projection, is followed to this distance, metres.
+TOLERANCE = 0.01
+MOST_ROUNDS = 12
+MOST_CORNERS = 20_000_000
+# Where along an edge it is looked at how far it bends: no bend is small at both places.
+PLACES = (0.3, 0.6)
+
+# Around the map what is brought along reaches as far as this share of the map's longer side.
+MARGIN = 1.0
+
+# Formats whose coordinates are said to be WGS 84 whatever they are.
+EARTHLY_FORMATS = ("GeoJSON", "GeoJSONSeq", "KML", "LIBKML")
+
+Where: TypeAlias = Surface | Georeference | None
+Move: TypeAlias = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Plane:
+    """What is planned in."""
+
+    georeference: Georeference | None
+    bounds: Bounds | None
+
+    @classmethod
+    def of(cls, where: Where) -> Plane:
+        """Of a surface, or of what it may carry."""
+        if where is None or isinstance(where, Georeference):
+            return cls(where, None)
+        if isinstance(where, Surface):
+            return cls(where.georeference, where.bounds)
+        raise InputError(f"where={where!r} is neither a Surface nor a Georeference")
+
+    def crs_of(self, layer: Layer) -> CRS | None:
+        """The CRS that a layer comes in; None where it is the plane's own, or there is none."""
+        reference = self.georeference
+        if reference is None:
+            if layer.crs is not None:
+                raise MapError(
+                    f"{layer.label} is in {layer.crs.name}, but the map has no CRS; give the map "
+                    "its CRS, or a file without one, in the map's coordinates"
+                )
+            return None
+        crs = layer.crs
+        if crs is None:
+            crs = reference.map_crs
+            tell(
+                VectorWarning,
+                f"{layer.label} has no CRS and is taken to be in the map's own coordinates, "
+                f"{crs.name}",
+            )
+        elif layer.driver in EARTHLY_FORMATS and not reference.is_earth and _is_wgs84(crs):
+            crs = reference.crs.geodetic_crs or reference.map_crs
+            tell(
+                VectorWarning,
+                f"{layer.label} cannot name another body than Earth and is taken as longitude "
+                f"and latitude of {crs.name}",
+            )
+        return None if crs == reference.crs else crs
+
+
+def _is_wgs84(crs: CRS) -> bool:
+    return bool(crs.is_geographic and crs.ellipsoid and crs.ellipsoid.name == "WGS 84")
+
+
+def placed(layer: Layer, plane: Plane) -> list[BaseGeometry]:
+    """The geometries of a layer on the plane."""
+    crs = plane.crs_of(layer)
+    if crs is None:
+        return list(layer.shapes)
+    assert plane.georeference is not None
+    target = plane.georeference.crs
+    try:
+        transformer = Transformer.from_crs(crs, target, always_xy=True)
+        region = None if plane.bounds is None else _region(transformer, plane.bounds)
+    except ProjError as error:
+        raise MapError(
+            f"{layer.label} is in {crs.name}, which cannot be brought onto {target.name}: "
+            f"{reason_of(error)}"
+        ) from None
+
+    def move(corners: Array) -> Array:
+        return np.column_stack(transformer.transform(corners[:, 0], corners[:, 1]))
+
+    metres = target.axis_info[0].unit_conversion_factor if target.axis_info else 1.0
+    with quietly(Path(layer.label)):
+        near = layer if region is None else _clipped(layer, region)
+        near = _with_more_corners(near, move, TOLERANCE / metres)
+        layer = replace(near, shapes=np.asarray(shapely.transform(near.shapes, move)))
+    require_places(
+        layer,
+        f"a place that {target.name} does not reach; check the file's CRS, or cut out the part "
+        "around the map",
+    )
+    return list(repaired(layer).shapes)
+
+
+def _region(transformer: Transformer, bounds: Bounds) -> Bounds | None:
+    """Where in the file's CRS the map lies, and around it; None where that is no rectangle."""
+    reach = MARGIN * max(bounds.width, bounds.height)
+    x0, y0, x1, y1 = bounds
+    low, high = (x0 - reach, y0 - reach), (x1 + reach, y1 + reach)
+    found = transformer.transform_bounds(*low, *high, densify_pts=41, direction="INVERSE")
+    region = Bounds(*found)
+    if not np.isfinite(found).all() or region.width <= 0.0 or region.height <= 0.0:
+        return None  # across the date line, or beyond where the projection holds
+    return region
+
+
+def _clipped(layer: Layer, region: Bounds) -> Layer:
+    """Without what lies far from the map, where projections give nonsense."""
+    frame = shapely.box(*region)
+    near = shapely.intersects(layer.shapes, frame)
+    shapes, numbers = layer.shapes[near], layer.numbers[near]
+    reaching = ~shapely.covered_by(shapes, frame)
+    cut = shapely.intersection(shapes[reaching], frame)
+    # What only touches the frame leaves points and lines there, far outside the map.
+    same = shapely.get_dimensions(cut) == shapely.get_dimensions(shapes[reaching])
+    shapes[reaching] = [
+        with_extent(shape) if kept and shape.geom_type == "GeometryCollection" else shape
+        for shape, kept in zip(cut, same, strict=True)
+    ]
+    kept = ~reaching
+    kept[reaching] = same
+    return replace(layer, shapes=shapes[kept], numbers=numbers[kept])
+
+
+def _with_more_corners(layer: Layer, move: Move, tolerance: float) -> Layer:
+    """With so many corners that straight edges follow the bent ones to the tolerance."""
+    shapes = layer.shapes.copy()
+    for _ in range(MOST_ROUNDS):
+        longest = _longest_edges(shapes, move, tolerance)
+        cut = np.flatnonzero(np.isfinite(longest))
+        if len(cut) == 0:
+            break
+        if float((shapely.length(shapes[cut]) / longest[cut]).sum()) > MOST_CORNERS:
+            raise MapError(
+                f"{layer.label}: its edges bend so much on the plane that they need more than "
+                f"{MOST_CORNERS:,} corners; cut out the part around the map"
+            )
+        shapes[cut] = shapely.segmentize(shapes[cut], longest[cut])
+    return replace(layer, shapes=shapes)
+
+
+def _longest_edges(shapes: Geometries, move: Move, tolerance: float) -> Array:
+    """How long edges of each shape (m,) may be, infinite where they are short enough."""
+    parts, owners = simple_parts(shapes, np.arange(len(shapes)))
+    is_point = np.isin(shapely.get_type_id(parts), POINTS)
+    lines, which = outlines(parts[~is_point])
+    owners = owners[~is_point][which]
+    corners, line = shapely.get_coordinates(lines, return_index=True)
+    same = line[1:] == line[:-1]
+    a, b, owner = corners[:-1][same], corners[1:][same], owners[line[1:][same]]
+    moved = move(corners)
+    moved_a, moved_b = moved[:-1][same], moved[1:][same]
+    bend = np.zeros(len(a))
+    with np.errstate(invalid="ignore"):
+        for t in PLACES:
+            off = move(a + t * (b - a)) - (moved_a + t * (moved_b - moved_a))
+            bend = np.maximum(bend, np.hypot(off[:, 0], off[:, 1]))
+    bent = np.isfinite(bend) & (bend > tolerance)
+    # A bend shrinks with the square of the edge's length.
+    pieces = np.ceil(1.2 * np.sqrt(bend[bent] / tolerance))
+    lengths = np.hypot(*(b - a)[bent].T) / np.maximum(pieces, 2.0)
+    longest = np.full(len(shapes), np.inf)
+    np.minimum.at(longest, owner[bent], lengths)
+    return longest
