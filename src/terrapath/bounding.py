@@ -136,7 +136,6 @@ class Search:
 
     def _solve(self) -> None:
         u = self.medium.march(self.model, limit=self.cap)
-        u[np.isnan(u)] = math.inf
         cap = min(self.cap, float(u[np.isfinite(u)].max(initial=0.0)))
         self.proposal = Certificate(
             value=0.0,
