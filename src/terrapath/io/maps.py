@@ -311,12 +311,11 @@ def read_surface(
             bands[0] *= factor
         scale = _scale(smoothing, base, target.cell, factor)
     raster = Raster.on(target, bands)
-    has_costs = any(part.kind == "cost" for part in parts)
     surface = (raster.trimmed() if base.grid.needs_warp else raster).to_surface(
         names=[part.name for part in parts],
         units=[unit, *(part.band.unit for part in parts[1:])],
         weights=[part.weight for part in parts],
-        kinds=[part.kind for part in parts] if has_costs else None,
+        kinds=[part.kind for part in parts],
         fill_holes=float(fill_holes),
         smoothing=scale,
     )
