@@ -15,11 +15,12 @@ from pyproj import CRS
 
 from ..errors import InputError, MapError
 from ..surface import Surface
+from ..surface.blocks import blocks
 from ..surface.georeference import Georeference, metres_of, parse_crs
 from ..surface.grid import Grid
 from ..surface.raster import Raster
 from ..surface.resampling import require_overlap, resample
-from ..surface.smoothing import blocks, quantisation_step, scale_for_step
+from ..surface.smoothing import quantisation_step, scale_for_step
 from ..validation import Array, as_bounds, require_count, require_not_negative
 from .arrays import band_of_numpy, band_of_xarray, is_xarray
 from .bands import Band, View

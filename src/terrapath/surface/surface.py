@@ -22,11 +22,12 @@ from ..validation import (
     require_not_negative,
     require_positive,
 )
+from .blocks import blocks
 from .costs import limited, require_costs, with_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
 from .mask import Mask
-from .smoothing import FEATURES_PER_SCALE, Smoothing, blocks, check_scale
+from .smoothing import FEATURES_PER_SCALE, Smoothing, check_scale
 
 Kind = Literal["rise", "cost"]
 
