@@ -17,7 +17,7 @@ from ._kernels import eikonal as kernels
 from ._kernels.metric_rows import ROWS, columns_of
 from .errors import InputError, OutsideSurfaceError
 from .free_space import FreeSpace, Obstacle
-from .lattice import Lattice, default_spacing
+from .lattice import Lattice
 from .problem import Path, Problem
 from .surface import Surface
 from .validation import Array, as_array, as_point, as_points
@@ -426,7 +426,7 @@ def field_of(
 ) -> DistanceField:
     """Distances from a problem's start through its free space; see ``distance_field``."""
     surface = problem.surface
-    chosen = default_spacing(problem.bounds, surface.resolution) if spacing is None else spacing
+    chosen = problem.default_spacing if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(surface, lattice, problem.free_space)
     field = march_from(surface, problem.free_space, problem.start, medium, watch=watch)

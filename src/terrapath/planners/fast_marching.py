@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 
 from ..eikonal import DistanceField, Medium, march_from
-from ..lattice import Lattice, default_spacing
+from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_positive
 from .base import INTERRUPT, Callback, Progress, answer_without_search
@@ -57,9 +57,7 @@ class _Run:
 
     def solve(self) -> Solution:
         problem = self.problem
-        spacing = self.planner.spacing or default_spacing(
-            problem.bounds, problem.surface.resolution
-        )
+        spacing = self.planner.spacing or problem.default_spacing
         try:
             for _ in range(HALVINGS + 1):
                 lattice = Lattice.spanning(problem.bounds, spacing)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from ..distinct_routes import routes_of_fields
 from ..eikonal import DistanceField, Medium, march_from
-from ..lattice import Lattice, default_spacing
+from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
 from .base import INTERRUPT, Callback, Progress, answer_without_search
@@ -103,9 +103,7 @@ class _Run:
     def find_routes(self) -> None:
         """The locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
-        spacing = self.planner.spacing or default_spacing(
-            problem.bounds, problem.surface.resolution
-        )
+        spacing = self.planner.spacing or problem.default_spacing
         for _ in range(HALVINGS + 1):
             lattice = Lattice.spanning(problem.bounds, spacing)
             self.total = self.samples + 2 * lattice.nx * lattice.ny
