@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import metric
-from ._kernels import descent, stencils
+from ._kernels import calendar_queue, descent, stencils
 from ._kernels import eikonal as kernels
 from ._kernels.metric_rows import ROWS, columns_of
 from .errors import InputError, OutsideSurfaceError
@@ -219,11 +219,11 @@ class Medium:
             window &= ~np.uint16(stencils.WINDOW)
         return front.u.reshape(lattice.ny, lattice.nx)
 
-    def _front(self, model: SourceModel) -> kernels.Front:
+    def _front(self, model: SourceModel) -> calendar_queue.Front:
         lattice, count = self.lattice, len(self.nodes)
         width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
         width *= self.typical_cost
-        front = kernels.Front(
+        front = calendar_queue.Front(
             u=np.full(count, np.inf),
             trial=np.full(count, np.inf),
             heads=np.full(BUCKETS, -1, np.int32),
@@ -231,11 +231,15 @@ class Medium:
             counters=np.zeros(2, np.int64),
         )
         if len(model.seeds):
-            front.counters[kernels.DAY] = int(model.seed_values.min() / width)
+            front.counters[calendar_queue.DAY] = int(model.seed_values.min() / width)
         return front
 
     def _settle(
-        self, front: kernels.Front, source: kernels.Source, limit: float, watch: Watch | None
+        self,
+        front: calendar_queue.Front,
+        source: kernels.Source,
+        limit: float,
+        watch: Watch | None,
     ) -> None:
         settled = 0
         while True:
