@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import metric
-from ._kernels import calendar_queue, descent, stencils
+from ._kernels import calendar_queue, descent, readers, stencils
 from ._kernels import eikonal as kernels
 from ._kernels.metric_rows import ROWS, columns_of
 from .errors import InputError, OutsideSurfaceError
@@ -189,12 +189,12 @@ class Medium:
         stencils.lay_tensor_stencils(given, lattice.data, nodes)
         return cls(lattice, nodes)
 
-    def _readers(self) -> stencils.Readers:
+    def _readers(self) -> readers.Readers:
         first = np.zeros(len(self.nodes) + 1, np.int32)
-        stencils.count_readers(self.nodes, self.lattice.nx, first)
+        readers.count_readers(self.nodes, self.lattice.nx, first)
         entries = np.empty(first[-1], np.uint32)
-        stencils.list_readers(self.nodes, self.lattice.nx, first, entries)
-        return stencils.Readers(first, entries)
+        readers.list_readers(self.nodes, self.lattice.nx, first, entries)
+        return readers.Readers(first, entries)
 
     def march(
         self, model: SourceModel, *, limit: float = math.inf, watch: Watch | None = None
