@@ -1050,7 +1050,15 @@ def test_the_checker_shares_nothing_with_the_solver():
         "import json, sys, terrapath.certificate\n"
         "print(json.dumps([name for name in sys.modules if name.startswith('terrapath.')]))"
     )
-    solvers = ("eikonal", "bounding", "refinement", "planners", "geodesics", "grid_search")
+    solvers = (
+        "eikonal",
+        "source_model",
+        "bounding",
+        "refinement",
+        "planners",
+        "geodesics",
+        "grid_search",
+    )
     assert not [name for name in loaded if name.split(".")[-1] in solvers]
 
 

@@ -19,9 +19,10 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from .certificate import Certificate, Core, Needs, cell_needs, certify, fingerprint
-from .eikonal import Medium, march_from, model_source, near_distance, window_radius
+from .eikonal import Medium, march_from
 from .lattice import Lattice
 from .problem import Problem
+from .source_model import model_source, near_distance, window_radius
 from .validation import Array, Bounds, require_positive
 
 # Sees each certificate; returning True stops the search.
