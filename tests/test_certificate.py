@@ -24,6 +24,7 @@ import terrapath as tp
 from processes import in_another_process
 from terrapath import certificate, scenes
 from terrapath._kernels import certificate as kernels
+from terrapath._kernels import surface_models, taylor
 from terrapath.bounding import Search, search_window
 from terrapath.certificate import Core, seal_of
 from terrapath.geodesics import trace_ray
@@ -78,7 +79,7 @@ def random_surface(random, layers, on_spline):
 def random_model(random, positive):
     c = random.uniform(0.0, 1.0, 10) * 10.0 ** random.integers(-3, 2, 10)
     c = c if positive else c * random.choice([-1.0, 0.0, 1.0], 10)
-    return kernels.Model(*c, random.choice([0.0, 0.1, 2.0]))
+    return taylor.Model(*c, random.choice([0.0, 0.1, 2.0]))
 
 
 POWERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)]
@@ -99,7 +100,7 @@ def test_a_product_of_models_encloses_all_products(seed):
     random = np.random.default_rng(seed)
     p, q = square(9)
     f, g = random_model(random, positive=False), random_model(random, positive=False)
-    product = kernels.times(f, g)
+    product = taylor.times(f, g)
     centre = value_of(product, p, q)
     scale = max(abs(centre).max(), product.r, 1.0)
     for a, b in itertools.product((-1.0, 0.3, 1.0), repeat=2):
@@ -112,7 +113,7 @@ def test_a_product_of_positive_models_is_attained_at_a_corner(seed):
     # Nothing is forgotten, and nothing is counted twice.
     random = np.random.default_rng(seed)
     f, g = random_model(random, positive=True), random_model(random, positive=True)
-    product = kernels.times(f, g)
+    product = taylor.times(f, g)
     assert sum(product) == pytest.approx(sum(f) * sum(g), rel=1e-13)
     for i in range(10):
         # By one coefficient of each: c_ij is a sum over the pairs that make p^i q^j.
@@ -127,30 +128,30 @@ def test_a_product_of_positive_models_is_attained_at_a_corner(seed):
 def test_sums_and_multiples_of_models_are_taken_coefficient_by_coefficient():
     random = np.random.default_rng(0)
     f, g = random_model(random, positive=False), random_model(random, positive=False)
-    np.testing.assert_allclose(kernels.plus(f, g), np.add(f, g), rtol=1e-15)
-    difference = kernels.minus(f, g)
+    np.testing.assert_allclose(taylor.plus(f, g), np.add(f, g), rtol=1e-15)
+    difference = taylor.minus(f, g)
     np.testing.assert_allclose(difference[:10], np.subtract(f, g)[:10], rtol=1e-15)
     assert difference.r == f.r + g.r
-    assert kernels.times_number(f, -3.0).r == 3.0 * f.r
+    assert taylor.times_number(f, -3.0).r == 3.0 * f.r
     p, q = square(9)
     offsets = abs(value_of(f, p, q) - f.c00).max()
-    assert offsets <= kernels.spread(f) - f.r + ROUNDING
+    assert offsets <= taylor.spread(f) - f.r + ROUNDING
     np.testing.assert_allclose(
-        [kernels.polynomial(f, *place) for place in zip(p, q, strict=True)], value_of(f, p, q)
+        [taylor.polynomial(f, *place) for place in zip(p, q, strict=True)], value_of(f, p, q)
     )
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_tensor_product_encloses_and_is_attained(seed):
     random = np.random.default_rng(seed)
-    s, t = (kernels.Series(*random.uniform(0.0, 1.0, 5)) for _ in range(2))
+    s, t = (taylor.Series(*random.uniform(0.0, 1.0, 5)) for _ in range(2))
     factor = random.uniform(0.1, 3.0)
-    model = kernels.tensor(s, t, factor)
+    model = taylor.tensor(s, t, factor)
     assert sum(model) == pytest.approx(factor * sum(s) * sum(t), rel=1e-13)
-    assert kernels.tensor(s, t, -factor).r == pytest.approx(model.r, rel=1e-13)
+    assert taylor.tensor(s, t, -factor).r == pytest.approx(model.r, rel=1e-13)
     signs = random.choice([-1.0, 1.0], (2, 4))
-    s, t = (kernels.Series(*(c[:4] * sign), c[4]) for c, sign in zip((s, t), signs, strict=True))
-    model = kernels.tensor(s, t, -factor)
+    s, t = (taylor.Series(*(c[:4] * sign), c[4]) for c, sign in zip((s, t), signs, strict=True))
+    model = taylor.tensor(s, t, -factor)
     p, q = square(9)
     for a, b in itertools.product((-1.0, 1.0), repeat=2):
         left = np.polyval(s[3::-1], p) + a * s.r
@@ -161,7 +162,7 @@ def test_a_tensor_product_encloses_and_is_attained(seed):
 
 def gaussian_errors(falloff, offset, a):
     """Largest errors of the two series of a Gaussian over t = offset +- a, beyond rounding."""
-    pair = kernels.gaussian(falloff, offset, a)
+    pair = surface_models.gaussian(falloff, offset, a)
     p = np.linspace(-1.0, 1.0, 201)
     t = offset + a * p
     value = np.exp(-falloff * t * t)
@@ -198,7 +199,7 @@ def test_the_remainders_of_a_gaussian_are_of_fourth_order_and_nearly_sharp():
 def test_the_series_of_a_gaussian_are_its_taylor_polynomials():
     with mpmath.workdps(40):
         for falloff, offset, a in ((0.5, 0.3, 0.2), (40.0, -0.11, 0.03), (1e-3, 5.0, 1.0)):
-            pair = kernels.gaussian(falloff, offset, a)
+            pair = surface_models.gaussian(falloff, offset, a)
 
             def f(t, falloff=falloff):
                 return mpmath.exp(-mpmath.mpf(falloff) * t * t)
@@ -214,7 +215,7 @@ def test_the_series_of_bumps_are_the_b_splines():
     p = np.linspace(-1.0, 1.0, 11)
     for k, t, w in itertools.product(range(4), (0.5, 0.3, 0.9), (0.1, 0.05, 0.0)):
         expected = oracles.CARDINAL(t + w * p + 3 - k)
-        series = kernels.bump(k, t, w)
+        series = surface_models.bump(k, t, w)
         assert series.r == 0.0
         np.testing.assert_allclose(np.polyval(series[3::-1], p), expected, atol=1e-15)
 
@@ -227,7 +228,7 @@ def test_spline_models_enclose_the_spline_and_its_slopes(seed):
     i, j = int(random.integers(0, 5)), int(random.integers(0, 4))
     w, v = random.choice([0.5, 0.2, 0.01, 0.0], 2)
     t, s = random.uniform(w, 1.0 - w), random.uniform(v, 1.0 - v)
-    layer = kernels.spline_models(sheet.coefficients, i, j, t, s, w, v, sheet.dx, sheet.dy)
+    layer = surface_models.spline_models(sheet.coefficients, i, j, t, s, w, v, sheet.dx, sheet.dy)
     p, q = square(9)
     points = np.column_stack([(i + t + w * p) * sheet.dx, (j + s + v * q) * sheet.dy])
     rounding = 1e-14 * max(height, 1.0)
@@ -268,7 +269,7 @@ def random_box(random, bound, surface):
         high = np.minimum(high, np.floor(place / step) * step + step)
     centre = random.uniform(low, high)
     room = np.minimum(centre - low, high - centre)
-    return i, j, kernels.Box(*centre, *(room * random.choice([1.0, 0.3, 0.01])))
+    return i, j, surface_models.Box(*centre, *(room * random.choice([1.0, 0.3, 0.01])))
 
 
 def facts_of(surface, bound, i, j, box, goal):
@@ -319,7 +320,7 @@ def test_the_facts_of_a_box_hold_on_needles(falloff):
         bound = kernels.Bound(4.0 + random.normal(size=(4, 4)), 4.0, 4.0, 2.0, 2.0)
         place = 5.0 + width * random.uniform(-2.0, 2.0, 2)
         half = min(scale * width, 0.4)
-        box = kernels.Box(*np.clip(place, 4.4, 5.6), half, half)
+        box = surface_models.Box(*np.clip(place, 4.4, 5.6), half, half)
         facts = facts_of(surface, bound, 0, 0, box, goal)
         sheet, terrain = oracles.Sheet(*bound), oracles.Terrain(surface)
         points = points_of(box, 81)
@@ -393,7 +394,7 @@ def test_the_facts_of_a_box_close_in_at_second_order(on_spline):
         goal = np.full(4, -7.0)
         x, y = random.uniform(4.3, 5.7, 2)
         for m, half in enumerate(halves):
-            box = kernels.Box(x, y, half, half)
+            box = surface_models.Box(x, y, half, half)
             facts = facts_of(surface, bound, 2, 2, box, goal)
             norm, lowest, _ = sampled_facts(surface, bound, box, goal)
             margin = kernels.margin_of_box(
@@ -488,7 +489,7 @@ def test_knots_cut_cells_and_never_leave_a_piece_of_no_width():
         spline = tp.Surface.from_grid(np.zeros((nx, nx)), axis, axis).data
         for offset in (0.0, 1e-13, -1e-13):
             begin = low + offset
-            count = kernels.cut_at_knots(spline, 0, begin, high, cuts)
+            count = surface_models.cut_at_knots(spline, 0, begin, high, cuts)
             pieces = cuts[: count + 1]
             assert pieces[0] == begin
             assert pieces[-1] == high
@@ -1042,12 +1043,22 @@ def test_the_checker_shares_nothing_with_the_solver():
         "surface.costs",
         "validation",
     }
-    assert imports_of(kernels) == {"compiler", "surfaces"}
+    assert imports_of(kernels) == {"compiler", "surface_models", "surfaces", "taylor"}
+    assert imports_of(surface_models) == {"compiler", "surfaces", "taylor"}
+    assert imports_of(taylor) == {"compiler"}
     loaded = in_another_process(
         "import json, sys, terrapath.certificate\n"
         "print(json.dumps([name for name in sys.modules if name.startswith('terrapath.')]))"
     )
-    solvers = ("eikonal", "bounding", "refinement", "planners", "geodesics", "grid_search")
+    solvers = (
+        "eikonal",
+        "source_model",
+        "bounding",
+        "refinement",
+        "planners",
+        "geodesics",
+        "grid_search",
+    )
     assert not [name for name in loaded if name.split(".")[-1] in solvers]
 
 
@@ -1449,7 +1460,7 @@ def test_what_overflows_proves_nothing():
     assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 2.0, 1.0), 3.0).proven == 1.0
     surface = tp.Surface.from_peaks([[(1e-145, 1e307, 0.5, 0.5)]]).data
     bound = kernels.Bound(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0)
-    box = kernels.Box(0.5, 0.5, 0.5, 0.5)
+    box = surface_models.Box(0.5, 0.5, 0.5, 0.5)
     anchor = kernels.Anchor(np.ones(3), 1.0, math.inf)
     assert kernels.margin_of_box(surface, bound, anchor, 1.0, 0, 0, box) == -math.inf
 

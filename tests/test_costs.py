@@ -13,7 +13,6 @@ from scipy.optimize import minimize_scalar
 
 import terrapath as tp
 from terrapath import metric
-from terrapath.eikonal import near_distance
 from terrapath.errors import CertificateError, InputError
 from terrapath.geodesics import (
     christoffel_symbols,
@@ -22,6 +21,7 @@ from terrapath.geodesics import (
     trace_ray,
 )
 from terrapath.problem import Path
+from terrapath.source_model import near_distance
 
 SIDE = 4.0
 

@@ -19,9 +19,10 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from .certificate import Certificate, Core, Needs, cell_needs, certify, fingerprint
-from .eikonal import Medium, march_from, model_source, near_distance, window_radius
+from .eikonal import Medium, march_from
 from .lattice import Lattice
 from .problem import Problem
+from .source_model import model_source, near_distance, window_radius
 from .validation import Array, Bounds, require_positive
 
 # Sees each certificate; returning True stops the search.
@@ -136,7 +137,6 @@ class Search:
 
     def _solve(self) -> None:
         u = self.medium.march(self.model, limit=self.cap)
-        u[np.isnan(u)] = math.inf
         cap = min(self.cap, float(u[np.isfinite(u)].max(initial=0.0)))
         self.proposal = Certificate(
             value=0.0,

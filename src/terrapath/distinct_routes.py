@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from .eikonal import DistanceField, Medium, march_from
-from .lattice import Lattice, default_spacing
+from .lattice import Lattice
 from .problem import Path, Problem
 from .refinement import refine
 from .validation import Array, require_count, require_positive
@@ -48,8 +48,7 @@ def alternatives(
         require_positive(spacing=spacing)
     if problem.start == problem.goal:
         return (problem.path([problem.start, problem.goal]),)
-    chosen = spacing or default_spacing(problem.bounds, problem.surface.resolution)
-    lattice = Lattice.spanning(problem.bounds, chosen)
+    lattice = Lattice.spanning(problem.bounds, spacing or problem.default_spacing)
     medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
     fields = [
         march_from(problem.surface, problem.free_space, end, medium)

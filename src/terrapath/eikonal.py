@@ -6,27 +6,21 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from . import metric
-from ._kernels import descent, stencils
+from ._kernels import calendar_queue, descent, readers, stencils
 from ._kernels import eikonal as kernels
 from ._kernels.metric_rows import ROWS, columns_of
 from .errors import InputError, OutsideSurfaceError
 from .free_space import FreeSpace, Obstacle
-from .lattice import Lattice, default_spacing
+from .lattice import Lattice
 from .problem import Path, Problem
+from .source_model import SEED_RADIUS, SourceModel, model_source, near_distance, window_radius
 from .surface import Surface
 from .validation import Array, as_array, as_point, as_points
-
-# Nodes this near to the source, in nodes, take the source model's value.
-SEED_RADIUS = 3.0
-# Differences are factored by the source model this far around the source, in nodes, or as far
-# as the surface has one feature, for the model knows no more.
-WINDOW_RADIUS = 16
 
 # A bucket of the queue is this share of a node's spacing, over the nodes of a side.
 BUCKET_SHARE = 4.0
@@ -43,109 +37,8 @@ LONGEST_SIDE = 2**15 - 1
 # Each is read by 6 + 8 others at most on average, and these are numbered by 31 bits.
 MOST_NODES = (2**31 - 1) // 14
 
-Nodes = npt.NDArray[np.int64]
 # Sees how many nodes are settled; returning True stops the march.
 Watch = Callable[[int], bool | None]
-
-
-class SourceModel(NamedTuple):
-    """The distance from the source nearby, as far as it is known in closed form."""
-
-    row: int
-    column: int
-    values: Array  # (rows, columns), map units, NaN where it does not hold
-    slope_x: Array  # per node
-    slope_y: Array
-    seeds: Nodes  # node numbers
-    seed_values: Array  # map units
-
-
-def near_distance(surface: Surface, source: tuple[float, float], points: Array) -> Array:
-    """Distance under h from a source to points (..., 2) nearby, map units.
-
-    The square of a geodesic's length is that of its chord c plus |II(c, c)|^2 / 12, II being
-    the second fundamental form, here at the middle: the relative error is of fourth order.
-    A cost multiplies it by its mean along the chord, but for what bending aside saves.
-    """
-    offsets = points - np.asarray(source)
-    middle = np.asarray(source) + 0.5 * offsets
-    chords = surface.lift(points) - surface.lift(np.asarray(source))
-    weights = surface.data.weights
-    bends = (
-        np.einsum("...i,...kij,...j->...k", offsets, surface.hessians(middle), offsets) * weights
-    )
-    pull = np.einsum("...k,...ki->...i", bends * weights, surface.gradients(middle))
-    inverse = (
-        metric.inverse_metric_tensor(surface, middle) * surface.cost(middle)[..., None, None] ** 2
-    )
-    normal = np.square(bends).sum(-1) - np.einsum("...i,...ij,...j->...", pull, inverse, pull)
-    squared = np.square(chords).sum(-1)
-    # On rough ground the formula knows nothing past the next bump: then it adds little.
-    squared += np.minimum(np.maximum(normal, 0.0) / 12.0, 0.05 * squared)
-    distance = np.asarray(np.sqrt(squared))
-    return distance * _mean_cost(surface, source, points, inverse) if surface.costs else distance
-
-
-def _mean_cost(
-    surface: Surface, source: tuple[float, float], points: Array, inverse: Array
-) -> Array:
-    """What the cost multiplies distances to points (..., 2) nearby by.
-
-    Simpson's mean along the chord; where the cost's logarithm has the slope g across the way,
-    bending aside saves g^2 d^2 / 24 of it. inverse (..., 2, 2) : of h in the middle, costs
-    left out.
-    """
-    offsets = points - np.asarray(source)
-    middle = np.asarray(source) + 0.5 * offsets
-    mean = (
-        surface.cost(np.asarray(source)) + 4.0 * surface.cost(middle) + surface.cost(points)
-    ) / 6
-    slope = surface.log_cost_jets(middle)[..., 1:3]
-    squared = np.einsum("...i,...ij,...j->...", offsets, np.linalg.inv(inverse), offsets)
-    steepness = np.einsum("...i,...ij,...j->...", slope, inverse, slope)
-    saved = (steepness * squared - np.square((slope * offsets).sum(-1))) / 24.0
-    return np.asarray(mean * (1.0 - np.clip(saved, 0.0, 0.05)))
-
-
-def model_source(
-    lattice: Lattice,
-    source: tuple[float, float],
-    radius: float,
-    distance: Callable[[Array], Array],
-    is_visible: Callable[[Array], npt.NDArray[np.bool_]] | None = None,
-) -> SourceModel:
-    """The model on all nodes within ``radius`` nodes of the source, in rows and columns.
-
-    distance : points (..., 2) -> (...), map units. is_visible : points (m, 2) -> (m,) bool.
-    """
-    column = (source[0] - lattice.bounds.x1_min) / lattice.dx
-    row = (source[1] - lattice.bounds.x2_min) / lattice.dy
-    columns = np.arange(max(math.floor(column - radius), 0), min(column + radius + 1, lattice.nx))
-    rows = np.arange(max(math.floor(row - radius), 0), min(row + radius + 1, lattice.ny))
-    columns, rows = columns.astype(np.int64), rows.astype(np.int64)
-    points = np.stack(np.meshgrid(lattice.x[columns], lattice.y[rows]), axis=-1)
-    values = distance(points)
-    if is_visible is not None:
-        values[~is_visible(points.reshape(-1, 2)).reshape(values.shape)] = np.nan
-    slope_x, slope_y = (_slope(distance, points, lattice, axis) for axis in range(2))
-    steps = np.hypot(*np.meshgrid(columns - column, rows - row))
-    planted = (steps <= SEED_RADIUS) & ~np.isnan(values)
-    seeds = (rows[:, None] * lattice.nx + columns)[planted]
-    return SourceModel(
-        int(rows[0]), int(columns[0]), values, slope_x, slope_y, seeds, values[planted]
-    )
-
-
-def _slope(distance: Callable[[Array], Array], points: Array, lattice: Lattice, axis: int) -> Array:
-    """Derivative of the distance along an axis, per node, by central differences."""
-    nodes = 1e-4  # near enough, and far above rounding
-    step = np.zeros(2)
-    step[axis] = nodes * (lattice.dx, lattice.dy)[axis]
-    bounds = lattice.bounds
-    ahead = np.clip(points + step, bounds[:2], bounds[2:])
-    behind = np.clip(points - step, bounds[:2], bounds[2:])
-    width = (ahead - behind)[..., axis] / (lattice.dx, lattice.dy)[axis]
-    return np.asarray((distance(ahead) - distance(behind)) / width)
 
 
 class Medium:
@@ -189,12 +82,12 @@ class Medium:
         stencils.lay_tensor_stencils(given, lattice.data, nodes)
         return cls(lattice, nodes)
 
-    def _readers(self) -> stencils.Readers:
+    def _readers(self) -> readers.Readers:
         first = np.zeros(len(self.nodes) + 1, np.int32)
-        stencils.count_readers(self.nodes, self.lattice.nx, first)
+        readers.count_readers(self.nodes, self.lattice.nx, first)
         entries = np.empty(first[-1], np.uint32)
-        stencils.list_readers(self.nodes, self.lattice.nx, first, entries)
-        return stencils.Readers(first, entries)
+        readers.list_readers(self.nodes, self.lattice.nx, first, entries)
+        return readers.Readers(first, entries)
 
     def march(
         self, model: SourceModel, *, limit: float = math.inf, watch: Watch | None = None
@@ -219,11 +112,11 @@ class Medium:
             window &= ~np.uint16(stencils.WINDOW)
         return front.u.reshape(lattice.ny, lattice.nx)
 
-    def _front(self, model: SourceModel) -> kernels.Front:
+    def _front(self, model: SourceModel) -> calendar_queue.Front:
         lattice, count = self.lattice, len(self.nodes)
         width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
         width *= self.typical_cost
-        front = kernels.Front(
+        front = calendar_queue.Front(
             u=np.full(count, np.inf),
             trial=np.full(count, np.inf),
             heads=np.full(BUCKETS, -1, np.int32),
@@ -231,11 +124,15 @@ class Medium:
             counters=np.zeros(2, np.int64),
         )
         if len(model.seeds):
-            front.counters[kernels.DAY] = int(model.seed_values.min() / width)
+            front.counters[calendar_queue.DAY] = int(model.seed_values.min() / width)
         return front
 
     def _settle(
-        self, front: kernels.Front, source: kernels.Source, limit: float, watch: Watch | None
+        self,
+        front: calendar_queue.Front,
+        source: kernels.Source,
+        limit: float,
+        watch: Watch | None,
     ) -> None:
         settled = 0
         while True:
@@ -355,12 +252,6 @@ class DistanceField:
         return float(np.isfinite(self.values).mean())
 
 
-def window_radius(surface: Surface, lattice: Lattice) -> float:
-    """How far around the source its model is used, in nodes."""
-    features = 2.0 * surface.resolution / max(lattice.dx, lattice.dy)
-    return min(max(features, SEED_RADIUS + 1.0), WINDOW_RADIUS)
-
-
 def march_from(
     surface: Surface,
     free_space: FreeSpace,
@@ -426,7 +317,7 @@ def field_of(
 ) -> DistanceField:
     """Distances from a problem's start through its free space; see ``distance_field``."""
     surface = problem.surface
-    chosen = default_spacing(problem.bounds, surface.resolution) if spacing is None else spacing
+    chosen = problem.default_spacing if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
     medium = Medium.of_surface(surface, lattice, problem.free_space)
     field = march_from(surface, problem.free_space, problem.start, medium, watch=watch)

@@ -16,6 +16,7 @@ from . import metric
 from .clearance import Constraints, outside_of
 from .errors import InputError, OutsideSurfaceError
 from .free_space import Obstacle
+from .lattice import default_spacing
 from .steepness import Steepness
 from .surface import Surface
 from .validation import Array, Bounds, as_bounds, as_point, require_not_negative
@@ -118,6 +119,11 @@ class Problem:
     def path(self, points: Any) -> Path:
         """A path of this problem's surface through the given points."""
         return Path(self.surface, np.asarray(points, np.float64))
+
+    @property
+    def default_spacing(self) -> float:
+        """The spacing of nodes, map units, where none is asked for."""
+        return default_spacing(self.bounds, self.surface.resolution)
 
     @cached_property
     def straight_length(self) -> float:

@@ -1,430 +1,26 @@
-"""Proven bounds over boxes, by Taylor models; the checker's own, and nothing of the solver's.
-
-A Taylor model of a function on a box is a polynomial of degree 3 in coordinates (p, q) that
-run over [-1, 1]^2, and a bound r on what the function differs from it anywhere in the box.
-Sums and products of models are models, so that terms which cancel do so exactly: the bound
-on a dual norm that is 1 up to a small smooth error is 1 up to that error, whatever the
-slopes (Makino and Berz 2003).
-"""
+"""What is proven of a function u over boxes; the checker's own, and nothing of the solver's."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from .compiler import inner_kernel, kernel, per_class
-from .surfaces import Peaks, Spline, floor_of
-
-
-class Box(NamedTuple):
-    """A rectangle of the plane: centre and half widths, which may be 0."""
-
-    x: float
-    y: float
-    a: float
-    b: float
-
-
-class Model(NamedTuple):
-    """Sum of c_ij p^i q^j, give or take r."""
-
-    c00: float
-    c10: float
-    c01: float
-    c20: float
-    c11: float
-    c02: float
-    c30: float
-    c21: float
-    c12: float
-    c03: float
-    r: float
-
-
-@inner_kernel
-def constant(c):
-    return Model(c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@inner_kernel
-def plus(f, g):
-    return Model(
-        f.c00 + g.c00,
-        f.c10 + g.c10,
-        f.c01 + g.c01,
-        f.c20 + g.c20,
-        f.c11 + g.c11,
-        f.c02 + g.c02,
-        f.c30 + g.c30,
-        f.c21 + g.c21,
-        f.c12 + g.c12,
-        f.c03 + g.c03,
-        f.r + g.r,
-    )
-
-
-@inner_kernel
-def times_number(f, s):
-    return Model(
-        s * f.c00,
-        s * f.c10,
-        s * f.c01,
-        s * f.c20,
-        s * f.c11,
-        s * f.c02,
-        s * f.c30,
-        s * f.c21,
-        s * f.c12,
-        s * f.c03,
-        abs(s) * f.r,
-    )
-
-
-@inner_kernel
-def minus(f, g):
-    return plus(f, times_number(g, -1.0))
-
-
-@inner_kernel
-def degree1(f):
-    """Sum of the sizes of the terms of degree 1."""
-    return abs(f.c10) + abs(f.c01)
-
-
-@inner_kernel
-def degree2(f):
-    return abs(f.c20) + abs(f.c11) + abs(f.c02)
-
-
-@inner_kernel
-def degree3(f):
-    return abs(f.c30) + abs(f.c21) + abs(f.c12) + abs(f.c03)
-
-
-@inner_kernel
-def spread(f):
-    """How far f can be from its value at the centre."""
-    return degree1(f) + degree2(f) + degree3(f) + f.r
-
-
-@inner_kernel
-def times(f, g):
-    """The product: what goes beyond degree 3 adds to the remainder."""
-    f1, f2, f3, g1, g2, g3 = degree1(f), degree2(f), degree3(f), degree1(g), degree2(g), degree3(g)
-    beyond = f1 * g3 + f2 * g2 + f3 * g1 + f2 * g3 + f3 * g2 + f3 * g3
-    size_f, size_g = abs(f.c00) + f1 + f2 + f3, abs(g.c00) + g1 + g2 + g3
-    return Model(
-        f.c00 * g.c00,
-        f.c00 * g.c10 + f.c10 * g.c00,
-        f.c00 * g.c01 + f.c01 * g.c00,
-        f.c00 * g.c20 + f.c10 * g.c10 + f.c20 * g.c00,
-        f.c00 * g.c11 + f.c10 * g.c01 + f.c01 * g.c10 + f.c11 * g.c00,
-        f.c00 * g.c02 + f.c01 * g.c01 + f.c02 * g.c00,
-        f.c00 * g.c30 + f.c10 * g.c20 + f.c20 * g.c10 + f.c30 * g.c00,
-        f.c00 * g.c21
-        + f.c10 * g.c11
-        + f.c01 * g.c20
-        + f.c20 * g.c01
-        + f.c11 * g.c10
-        + f.c21 * g.c00,
-        f.c00 * g.c12
-        + f.c01 * g.c11
-        + f.c10 * g.c02
-        + f.c02 * g.c10
-        + f.c11 * g.c01
-        + f.c12 * g.c00,
-        f.c00 * g.c03 + f.c01 * g.c02 + f.c02 * g.c01 + f.c03 * g.c00,
-        beyond + size_f * g.r + size_g * f.r + f.r * g.r,
-    )
-
-
-# Tensor products of one-dimensional series
-
-
-class Series(NamedTuple):
-    """c0 + c1 p + c2 p^2 + c3 p^3, give or take r."""
-
-    c0: float
-    c1: float
-    c2: float
-    c3: float
-    r: float
-
-
-@inner_kernel
-def tensor(s, t, factor):
-    """The model of factor s(p) t(q)."""
-    s0, s1, s2, s3 = factor * s.c0, factor * s.c1, factor * s.c2, factor * s.c3
-    a1, a2, a3, b1, b2, b3 = abs(s1), abs(s2), abs(s3), abs(t.c1), abs(t.c2), abs(t.c3)
-    beyond = a1 * b3 + a2 * (b2 + b3) + a3 * (b1 + b2 + b3)
-    size_s, size_t = abs(s0) + a1 + a2 + a3, abs(t.c0) + b1 + b2 + b3
-    rest = abs(factor) * s.r
-    return Model(
-        s0 * t.c0,
-        s1 * t.c0,
-        s0 * t.c1,
-        s2 * t.c0,
-        s1 * t.c1,
-        s0 * t.c2,
-        s3 * t.c0,
-        s2 * t.c1,
-        s1 * t.c2,
-        s0 * t.c3,
-        beyond + size_s * t.r + size_t * rest + rest * t.r,
-    )
-
-
-class Layer(NamedTuple):
-    """Models of a layer's value and of its slopes, all times its weight."""
-
-    value: Model
-    slope_x: Model
-    slope_y: Model
-
-
-@inner_kernel
-def plus_layer(f, g):
-    return Layer(plus(f.value, g.value), plus(f.slope_x, g.slope_x), plus(f.slope_y, g.slope_y))
-
-
-# Cramer's inequality: |H_n(t)| exp(-t^2 / 2) <= K 2^(n/2) sqrt(n!).
-_CRAMER = 1.0866
-
-
-class SeriesPair(NamedTuple):
-    """Series of a function and of its derivative."""
-
-    value: Series
-    slope: Series
-
-
-@inner_kernel
-def gaussian(falloff, offset, a):
-    """Series of exp(-falloff t^2) around t = offset over half width a."""
-    c0 = math.exp(-falloff * offset * offset)
-    c1 = -2.0 * falloff * offset * c0
-    c2 = -falloff * (offset * c1 + c0)
-    c3 = -2.0 / 3.0 * falloff * (offset * c2 + c1)
-    c4 = -0.5 * falloff * (offset * c3 + c2)
-    nearest = max(abs(offset) - a, 0.0)
-    top = _CRAMER * math.exp(-0.5 * falloff * nearest * nearest) * (a * a) ** 2 / 24.0
-    rest4 = top * (2.0 * falloff) ** 2 * math.sqrt(24.0)
-    rest5 = top * (2.0 * falloff) ** 2 * math.sqrt(2.0 * falloff * 120.0)
-    value = Series(c0, c1 * a, c2 * a * a, c3 * a * a * a, rest4)
-    slope = Series(c1, 2.0 * c2 * a, 3.0 * c3 * a * a, 4.0 * c4 * a * a * a, rest5)
-    return SeriesPair(value, slope)
-
-
-@kernel
-def peaks_layer(surface, layer, box):
-    zero = constant(0.0)
-    total = Layer(zero, zero, zero)
-    for n in range(surface.first[layer], surface.first[layer + 1]):
-        amplitude = surface.weights[layer] * surface.peaks[n, 0]
-        falloff = surface.peaks[n, 1]
-        s = gaussian(falloff, box.x - surface.peaks[n, 2], box.a)
-        t = gaussian(falloff, box.y - surface.peaks[n, 3], box.b)
-        peak = Layer(
-            tensor(s.value, t.value, amplitude),
-            tensor(s.slope, t.value, amplitude),
-            tensor(s.value, t.slope, amplitude),
-        )
-        total = plus_layer(total, peak)
-    return total
-
-
-@inner_kernel
-def bump(k, t, w):
-    """Series of the k-th of the four cubic B-splines of a knot span, t + w p in [0, 1]."""
-    if k == 0:
-        r = 1.0 - t
-        return Series(r * r * r / 6.0, -0.5 * r * r * w, 0.5 * r * w * w, -w * w * w / 6.0, 0.0)
-    if k == 3:
-        return Series(t * t * t / 6.0, 0.5 * t * t * w, 0.5 * t * w * w, w * w * w / 6.0, 0.0)
-    if k == 1:
-        return Series(
-            (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-            t * (1.5 * t - 2.0) * w,
-            0.5 * (3.0 * t - 2.0) * w * w,
-            0.5 * w * w * w,
-            0.0,
-        )
-    r = 1.0 - t
-    return Series(
-        (4.0 - 6.0 * r * r + 3.0 * r * r * r) / 6.0,
-        -r * (1.5 * r - 2.0) * w,
-        0.5 * (3.0 * r - 2.0) * w * w,
-        -0.5 * w * w * w,
-        0.0,
-    )
-
-
-@inner_kernel
-def derivative(s, scale):
-    """Series of ds/dp times a scale."""
-    return Series(scale * s.c1, 2.0 * scale * s.c2, 3.0 * scale * s.c3, 0.0, 0.0)
-
-
-@kernel
-def spline_models(coefficients, i, j, t, s, w, v, dx, dy):
-    """Value and slopes of a bicubic spline inside one of its cells.
-
-    coefficients (ny + 2, nx + 2); the box is centred at (t, s) in the cell, half widths
-    (w, v), all as shares of the cell, which is dx by dy.
-    """
-    zero = constant(0.0)
-    # What all coefficients share adds to the value alone, and no digit of a slope cancels.
-    base = coefficients[j + 1, i + 1]
-    total = Layer(constant(base), zero, zero)
-    for q in range(4):
-        # Along a row first: the sum over the columns is a series in p.
-        c0, c1, c2, c3 = 0.0, 0.0, 0.0, 0.0
-        for k in range(4):
-            series = bump(k, t, w)
-            c = coefficients[j + q, i + k] - base
-            c0 += c * series.c0
-            c1 += c * series.c1
-            c2 += c * series.c2
-            c3 += c * series.c3
-        row = Series(c0, c1, c2, c3, 0.0)
-        column = bump(q, s, v)
-        # With a half width of 0 the slope's series is its value at the centre.
-        row_slope = (
-            derivative(row, 1.0 / (w * dx))
-            if w > 0.0
-            else point_slope(coefficients, i, j + q, t, dx)
-        )
-        column_slope = derivative(column, 1.0 / (v * dy)) if v > 0.0 else bump_slope(q, s, dy)
-        total = plus_layer(
-            total,
-            Layer(
-                tensor(row, column, 1.0),
-                tensor(row_slope, column, 1.0),
-                tensor(row, column_slope, 1.0),
-            ),
-        )
-    return total
-
-
-@inner_kernel
-def bump_slope(k, t, dx):
-    """The slope of a B-spline at a point, as a series over no width."""
-    return Series(bump(k, t, 1.0).c1 / dx, 0.0, 0.0, 0.0, 0.0)
-
-
-@inner_kernel
-def point_slope(coefficients, i, row, t, dx):
-    """The slope along a row of coefficients at a point, as a series over no width."""
-    total = 0.0
-    for k in range(4):
-        total += coefficients[row, i + k] * bump_slope(k, t, dx).c0
-    return Series(total, 0.0, 0.0, 0.0, 0.0)
-
-
-@inner_kernel
-def cell_of(x, x0, dx, cells):
-    """The knot span that x lies in, clamped to the outermost ones."""
-    return min(max(math.floor((x - x0) / dx), 0), cells - 1)
-
-
-@kernel
-def spline_over(surface, coefficients, box):
-    """Models of a spline on the surface's knots over a box, and of its slopes."""
-    i = cell_of(box.x, surface.x0, surface.dx, coefficients.shape[1] - 3)
-    j = cell_of(box.y, surface.y0, surface.dy, coefficients.shape[0] - 3)
-    return spline_models(
-        coefficients,
-        i,
-        j,
-        (box.x - surface.x0) / surface.dx - i,
-        (box.y - surface.y0) / surface.dy - j,
-        box.a / surface.dx,
-        box.b / surface.dy,
-        surface.dx,
-        surface.dy,
-    )
-
-
-@inner_kernel
-def spline_layer(surface, layer, box):
-    f = spline_over(surface, surface.coefficients[layer], box)
-    w = surface.weights[layer]
-    return Layer(times_number(f.value, w), times_number(f.slope_x, w), times_number(f.slope_y, w))
-
-
-@per_class({Peaks: peaks_layer, Spline: spline_layer})
-def layer_over(surface, layer, box):
-    """Models of one layer over a box, which must lie within one knot span of a spline."""
-
-
-@kernel
-def exponential(f):
-    """The model of exp f, by its series around the constant term."""
-    t = Model(0.0, f.c10, f.c01, f.c20, f.c11, f.c02, f.c30, f.c21, f.c12, f.c03, f.r)
-    squared = times(t, t)
-    total = plus(plus(constant(1.0), t), times_number(squared, 0.5))
-    total = plus(total, times_number(times(squared, t), 1.0 / 6.0))
-    reach = spread(t)
-    rest = math.exp(reach) * (reach * reach) ** 2 / 24.0
-    total = plus(total, Model(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, rest))
-    return times_number(total, math.exp(f.c00))
-
-
-@inner_kernel
-def peaks_times_squared_cost(surface, box, f):
-    return f
-
-
-@kernel
-def spline_times_squared_cost(surface, box, f):
-    if surface.log_cost.shape[0] == 0:
-        return f
-    log_cost = spline_over(surface, surface.log_cost[0], box).value
-    return times(f, exponential(times_number(log_cost, 2.0)))
-
-
-@per_class({Peaks: peaks_times_squared_cost, Spline: spline_times_squared_cost})
-def times_squared_cost(surface, box, f):
-    """The model of c^2 f over a box, which must lie within one knot span of a spline."""
-
-
-# Pieces of a cell on which the surface is smooth
-
-
-@kernel
-def peaks_cuts(surface, axis, low, high, cuts):
-    cuts[0], cuts[1] = low, high
-    return 1
-
-
-@kernel
-def spline_cuts(surface, axis, low, high, cuts):
-    origin, step = (surface.x0, surface.dx) if axis == 0 else (surface.y0, surface.dy)
-    cells = surface.coefficients.shape[2 - axis] - 3
-    pieces = 0
-    cuts[0] = low
-    first = max(math.floor((low - origin) / step) + 1, 1)
-    for k in range(first, cells):
-        knot = origin + k * step
-        if knot >= high:
-            break
-        # A knot within rounding of the end before would leave a piece of no width.
-        if knot > cuts[pieces] + 1e-9 * step and knot < high - 1e-9 * step:
-            pieces += 1
-            cuts[pieces] = knot
-    cuts[pieces + 1] = high
-    return pieces + 1
-
-
-@per_class({Peaks: peaks_cuts, Spline: spline_cuts})
-def cut_at_knots(surface, axis, low, high, cuts):
-    """Cut [low, high] of an axis where the surface's pieces meet; returns how many there are.
-
-    Piece k is [cuts[k], cuts[k + 1]].
-    """
-
-
-# The claim
+from .compiler import inner_kernel, kernel
+from .surface_models import Box, cut_at_knots, layer_over, spline_models, times_squared_cost
+from .surfaces import floor_of
+from .taylor import (
+    Model,
+    constant,
+    cross,
+    keep,
+    kept,
+    minus,
+    plus,
+    polynomial,
+    spread,
+    times,
+    times_number,
+)
 
 
 class Bound(NamedTuple):
@@ -453,6 +49,9 @@ def bound_over(bound, i, j, box):
     )
 
 
+# What is proven of a box
+
+
 class Facts(NamedTuple):
     """What is proven of one box."""
 
@@ -463,25 +62,9 @@ class Facts(NamedTuple):
 
 
 @inner_kernel
-def cross(ax, ay, bx, by):
-    """The model of a_x b_y - a_y b_x."""
-    return minus(times(ax, by), times(ay, bx))
-
-
-@inner_kernel
 def outside(low, high, value):
     """Distance of a value from an interval."""
     return max(low - value, value - high, 0.0)
-
-
-@inner_kernel
-def polynomial(f, p, q):
-    """The value of a model's polynomial."""
-    return (
-        f.c00
-        + p * (f.c10 + p * (f.c20 + p * f.c30 + q * f.c21) + q * f.c11)
-        + q * (f.c01 + q * (f.c02 + q * f.c03 + p * f.c12))
-    )
 
 
 @inner_kernel
@@ -500,19 +83,6 @@ def planar_distance(box, goal):
     east = outside(box.x - box.a, box.x + box.a, goal[0])
     north = outside(box.y - box.b, box.y + box.b, goal[1])
     return math.hypot(east, north)
-
-
-@inner_kernel
-def keep(work, row, f):
-    """Write a model's coefficients into a row of the workspace."""
-    for k, c in enumerate(f):
-        work[row, k] = c
-
-
-@inner_kernel
-def kept(work, row):
-    c = work[row]
-    return Model(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10])
 
 
 @kernel
@@ -554,6 +124,9 @@ def facts_of_box(surface, bound, goal, i, j, box, work):
         u.value.c00 - spread(u.value),
         floor * math.sqrt(chord),
     )
+
+
+# What the cells need
 
 
 class Need(NamedTuple):
@@ -636,6 +209,8 @@ def need_of_cell(surface, bound, goal, horizon, i, j, cutting):
 
 # A box is cut in four where M could be lower for it by this share, and so often at most.
 WORTHWHILE = 2e-5
+
+
 DEPTH = 6
 
 
@@ -724,6 +299,9 @@ def least_norm(surface, bound, goal, horizon, order, needs, norm, cutting):
                 found = norm_of_box(surface, bound, goal, horizon, i, j, box, found, cutting)
         norm = min(found, needs[j, i])
     return norm
+
+
+# The margin on a core's edge
 
 
 class Anchor(NamedTuple):

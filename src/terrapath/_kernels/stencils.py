@@ -15,6 +15,7 @@ import numpy as np
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
 from .metric_rows import H11, H12, H22, fill_row
+from .selling import Superbase, obtuse_superbase, products
 from .surfaces import Metric
 
 # Bits of a node's links: the neighbour on side 2 k + (0: +e_k, 1: -e_k) may be used; so may
@@ -48,65 +49,7 @@ EDGE = 6
 AROUND = 8
 
 
-class Readers(NamedTuple):
-    """Which nodes have a node in their stencils: entries[first[n]:first[n + 1]].
-
-    An entry is 8 times the reader's number plus the side on which it reads the node.
-    """
-
-    first: np.ndarray  # (n + 1,) int32
-    entries: np.ndarray  # uint32
-
-
-# Selling's algorithm
-
-# Superbase flips: some log2 of the anisotropy are needed.
-MOST_FLIPS = 200
-
-
-class Superbase(NamedTuple):
-    """Lattice vectors b_0, b_1 of a basis; b_2 = -b_0 - b_1 completes the superbase."""
-
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-
-
-class Products(NamedTuple):
-    """Products b_k^T D b_l of a superbase's vectors."""
-
-    p01: float
-    p12: float
-    p20: float
-
-
-@inner_kernel
-def products(d, b):
-    """The products of a superbase under the tensor d."""
-    c0x, c0y = d.h11 * b.x0 + d.h12 * b.y0, d.h12 * b.x0 + d.h22 * b.y0
-    c1x, c1y = d.h11 * b.x1 + d.h12 * b.y1, d.h12 * b.x1 + d.h22 * b.y1
-    p01 = c0x * b.x1 + c0y * b.y1
-    return Products(p01, -p01 - c1x * b.x1 - c1y * b.y1, -p01 - c0x * b.x0 - c0y * b.y0)
-
-
-@inner_kernel
-def obtuse_superbase(d, b):
-    """The D-obtuse superbase that Selling's algorithm makes of b.
-
-    A neighbour's superbase is mostly right already.
-    """
-    for _ in range(MOST_FLIPS):
-        p = products(d, b)
-        if p.p01 > 0.0:
-            b = Superbase(b.x1, b.y1, -b.x0, -b.y0)
-        elif p.p12 > 0.0:
-            b = Superbase(-b.x1, -b.y1, -b.x0 - b.x1, -b.y0 - b.y1)
-        elif p.p20 > 0.0:
-            b = Superbase(b.x0, b.y0, b.x0 + b.x1, b.y0 + b.y1)
-        else:
-            break
-    return b
+# Laying stencils
 
 
 @inner_kernel
@@ -114,9 +57,6 @@ def inverse(h):
     """The tensor h^-1."""
     determinant = h.h11 * h.h22 - h.h12 * h.h12
     return Metric(h.h22 / determinant, -h.h12 / determinant, h.h11 / determinant)
-
-
-# Laying stencils
 
 
 class Vector(NamedTuple):
@@ -375,50 +315,3 @@ def length_at(node, e):
 def edge_length(nodes, n, e, m):
     """Length of the edge e from node n to m: the mean of those under the metrics of both."""
     return 0.5 * (length_at(nodes[n], e) + length_at(nodes[m], e))
-
-
-# Readers
-
-
-@kernel
-def count_readers(nodes, nx, first):
-    """Make first[m] the number of readers of all nodes before m."""
-    for n in range(nodes.shape[0]):
-        node = nodes[n]
-        for side in range(6):
-            if node.links >> side & 1:
-                e = vector_of(node, side)
-                first[n + e.y * nx + e.x + 1] += 1
-        if node.around:
-            for k in range(AROUND):
-                if node.around >> k & 1:
-                    first[n + around(k).y * nx + around(k).x + 1] += 1
-    for n in range(nodes.shape[0]):
-        first[n + 1] += first[n]
-
-
-@inner_kernel
-def note_reader(first, entries, m, n, side):
-    """Node n reads node m on a side."""
-    entries[first[m]] = 8 * n + side
-    first[m] += 1
-
-
-@kernel
-def list_readers(nodes, nx, first, entries):
-    """Fill in the entries."""
-    for n in range(nodes.shape[0]):
-        node = nodes[n]
-        for side in range(6):
-            if node.links >> side & 1:
-                e = vector_of(node, side)
-                note_reader(first, entries, n + e.y * nx + e.x, n, side)
-        if node.around:
-            for k in range(AROUND):
-                if node.around >> k & 1:
-                    e = around(k)
-                    note_reader(first, entries, n + e.y * nx + e.x, n, EDGE)
-    # Each list's beginning was moved to its end, where the next begins.
-    for n in range(nodes.shape[0], 0, -1):
-        first[n] = first[n - 1]
-    first[0] = 0

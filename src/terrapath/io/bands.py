@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import MapError
+from ..surface.blocks import BLOCK
 from ..surface.grid import Grid
-from ..surface.smoothing import BLOCK
 from ..validation import Array, Bounds
 
 MARGIN = 8  # cells around a window: what lies beyond moves the spline by 1e-4 of itself

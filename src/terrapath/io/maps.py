@@ -15,11 +15,12 @@ from pyproj import CRS
 
 from ..errors import InputError, MapError
 from ..surface import Surface
+from ..surface.blocks import blocks
 from ..surface.georeference import Georeference, metres_of, parse_crs
 from ..surface.grid import Grid
 from ..surface.raster import Raster
 from ..surface.resampling import require_overlap, resample
-from ..surface.smoothing import blocks, quantisation_step, scale_for_step
+from ..surface.smoothing import quantisation_step, scale_for_step
 from ..validation import Array, as_bounds, require_count, require_not_negative
 from .arrays import band_of_numpy, band_of_xarray, is_xarray
 from .bands import Band, View
@@ -311,12 +312,11 @@ def read_surface(
             bands[0] *= factor
         scale = _scale(smoothing, base, target.cell, factor)
     raster = Raster.on(target, bands)
-    has_costs = any(part.kind == "cost" for part in parts)
     surface = (raster.trimmed() if base.grid.needs_warp else raster).to_surface(
         names=[part.name for part in parts],
         units=[unit, *(part.band.unit for part in parts[1:])],
         weights=[part.weight for part in parts],
-        kinds=[part.kind for part in parts] if has_costs else None,
+        kinds=[part.kind for part in parts],
         fill_holes=float(fill_holes),
         smoothing=scale,
     )

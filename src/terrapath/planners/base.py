@@ -43,6 +43,28 @@ class Progress(NamedTuple):
 Callback = Callable[[Progress], bool | None]
 
 
+class Stopper:
+    """The clock and the callback of a run, and which of them ended it."""
+
+    def __init__(self, callback: Callback | None, time_limit: float | None) -> None:
+        self.callback, self.time_limit = callback, time_limit
+        self.started = time.perf_counter()
+        self.stopped_by = ""
+
+    @property
+    def seconds(self) -> float:
+        """Since the run began."""
+        return time.perf_counter() - self.started
+
+    def must_stop(self, progress: Progress) -> bool:
+        """Show the progress to the callback and look at the clock; once True, always True."""
+        if self.callback is not None and self.callback(progress):
+            self.stopped_by = "callback"
+        elif self.time_limit is not None and progress.seconds >= self.time_limit:
+            self.stopped_by = "time limit"
+        return bool(self.stopped_by)
+
+
 class Planner(Protocol):
     """A frozen set of options that turns problems into solutions."""
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass
 
 from ..eikonal import DistanceField, Medium, march_from
-from ..lattice import Lattice, default_spacing
+from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_positive
-from .base import INTERRUPT, Callback, Progress, answer_without_search
+from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search
 
 # Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
 HALVINGS = 2
@@ -48,18 +47,16 @@ class FastMarching:
 
 
 class _Run:
-    """One run: the clock, and why it stopped."""
+    """One run, and how far it came."""
 
     def __init__(self, planner: FastMarching, problem: Problem, callback: Callback | None) -> None:
-        self.planner, self.problem, self.callback = planner, problem, callback
-        self.started = time.perf_counter()
-        self.settled, self.total, self.stopped_by = 0, 0, ""
+        self.planner, self.problem = planner, problem
+        self.stopper = Stopper(callback, planner.time_limit)
+        self.settled, self.total = 0, 0
 
     def solve(self) -> Solution:
         problem = self.problem
-        spacing = self.planner.spacing or default_spacing(
-            problem.bounds, problem.surface.resolution
-        )
+        spacing = self.planner.spacing or problem.default_spacing
         try:
             for _ in range(HALVINGS + 1):
                 lattice = Lattice.spanning(problem.bounds, spacing)
@@ -68,12 +65,12 @@ class _Run:
                 if path is not None:
                     shape = f"{lattice.nx:,} x {lattice.ny:,} nodes"
                     return self.answer(path, float(field.at(problem.goal)), shape)
-                if self.stopped_by:
+                if self.stopper.stopped_by:
                     break
                 spacing *= 0.5
         except KeyboardInterrupt:
-            self.stopped_by = INTERRUPT
-        return self.answer(None, None, self.stopped_by or "no way between the nodes")
+            self.stopper.stopped_by = INTERRUPT
+        return self.answer(None, None, self.stopper.stopped_by or "no way between the nodes")
 
     def march(self, lattice: Lattice) -> DistanceField:
         """The field, as far as there is time for it."""
@@ -85,15 +82,9 @@ class _Run:
         )
 
     def must_stop(self, settled: int) -> bool:
-        """Look at the callback and the clock."""
         self.settled = settled
-        seconds, limit = time.perf_counter() - self.started, self.planner.time_limit
-        progress = Progress(settled, self.total, seconds, math.inf)
-        if self.callback is not None and self.callback(progress):
-            self.stopped_by = "callback"
-        elif limit is not None and seconds >= limit:
-            self.stopped_by = "time limit"
-        return bool(self.stopped_by)
+        progress = Progress(settled, self.total, self.stopper.seconds, math.inf)
+        return self.stopper.must_stop(progress)
 
     def answer(self, path: Path | None, cost: float | None, stopped_by: str) -> Solution:
         status = Status.NOT_FOUND if path is None else Status.SOLVED
@@ -103,7 +94,7 @@ class _Run:
             status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
             path=path,
             cost=cost,
-            seconds=time.perf_counter() - self.started,
+            seconds=self.stopper.seconds,
             samples=self.settled,
             stopped_by=stopped_by,
         )

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from .._kernels import grid_search as kernels
 from ..errors import InputError
-from ..lattice import Lattice, default_spacing
+from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
 from ..surface import Surface
 from ..validation import Array, require_count, require_positive
@@ -190,10 +190,7 @@ def _allocate(lattice: Lattice, surface: Surface) -> kernels.Graph:
 
 def _prepare(problem: Problem, planner: Dijkstra) -> _Search:
     """Open the start, and have the kernels loaded, or compiled, before the clock starts."""
-    lattice = Lattice.spanning(
-        problem.bounds,
-        planner.spacing or default_spacing(problem.bounds, problem.surface.resolution),
-    )
+    lattice = Lattice.spanning(problem.bounds, planner.spacing or problem.default_spacing)
     nodes = kernels.Nodes(
         x=lattice.x,
         y=lattice.y,

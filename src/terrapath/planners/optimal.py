@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, replace
 
 from ..distinct_routes import routes_of_fields
 from ..eikonal import DistanceField, Medium, march_from
-from ..lattice import Lattice, default_spacing
+from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, answer_without_search
+from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search
 from .finishing import bounded, warn_unfinished
 
 # Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
@@ -58,54 +57,40 @@ class Optimal:
 
 
 class _Run:
-    """One run: the clock, and what was found so far."""
+    """One run, and what was found so far."""
 
     def __init__(self, planner: Optimal, problem: Problem, callback: Callback | None) -> None:
-        self.planner, self.problem, self.callback = planner, problem, callback
-        self.started = time.perf_counter()
-        self.samples, self.total, self.stopped_by = 0, 0, ""
+        self.planner, self.problem = planner, problem
+        self.stopper = Stopper(callback, planner.time_limit)
+        self.samples, self.total = 0, 0
         self.direct: Path | None = None
         self.routes: tuple[Path, ...] = ()
 
-    @property
-    def seconds(self) -> float:
-        return time.perf_counter() - self.started
-
-    def see(self, progress: Progress) -> bool:
-        """Look at the callback and the clock; True where the run is to stop."""
-        limit = self.planner.time_limit
-        if self.callback is not None and self.callback(progress):
-            self.stopped_by = "callback"
-        elif limit is not None and progress.seconds >= limit:
-            self.stopped_by = "time limit"
-        return bool(self.stopped_by)
-
     def must_stop(self, settled: int = 0) -> bool:
         best = self.direct.length if self.direct is not None else math.inf
-        return self.see(Progress(self.samples + settled, self.total, self.seconds, best))
+        progress = Progress(self.samples + settled, self.total, self.stopper.seconds, best)
+        return self.stopper.must_stop(progress)
 
     def solve(self) -> Solution:
         try:
             self.find_routes()
         except KeyboardInterrupt:
-            self.stopped_by = INTERRUPT
+            self.stopper.stopped_by = INTERRUPT
         solution = self.answer()
-        if solution.path is None or self.stopped_by:
+        if solution.path is None or self.stopper.stopped_by:
             return solution
         target = self.planner.target_gap
-        solution = bounded(solution, target_gap=target, callback=self.see)
+        solution = bounded(solution, target_gap=target, callback=self.stopper.must_stop)
         if solution.status is Status.INTERRUPTED:
             return solution
         met = solution.gap is not None and solution.gap <= target
-        reason = "gap met" if met else self.stopped_by or "finest lattice"
+        reason = "gap met" if met else self.stopper.stopped_by or "finest lattice"
         return replace(solution, stopped_by=reason)
 
     def find_routes(self) -> None:
         """The locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
-        spacing = self.planner.spacing or default_spacing(
-            problem.bounds, problem.surface.resolution
-        )
+        spacing = self.planner.spacing or problem.default_spacing
         for _ in range(HALVINGS + 1):
             lattice = Lattice.spanning(problem.bounds, spacing)
             self.total = self.samples + 2 * lattice.nx * lattice.ny
@@ -149,12 +134,12 @@ class _Run:
         return Solution(
             problem=self.problem,
             planner=self.planner.name,
-            status=Status.INTERRUPTED if self.stopped_by == INTERRUPT else status,
+            status=Status.INTERRUPTED if self.stopper.stopped_by == INTERRUPT else status,
             path=path,
             cost=None if path is None else path.length,
-            seconds=self.seconds,
+            seconds=self.stopper.seconds,
             samples=self.samples,
-            stopped_by=self.stopped_by or "no way between the nodes",
+            stopped_by=self.stopper.stopped_by or "no way between the nodes",
             unrefined=None if path is self.direct else self.direct,
             alternatives=self.routes[1:],
         )

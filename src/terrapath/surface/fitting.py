@@ -11,15 +11,9 @@ import numpy as np
 from .._kernels.surfaces import Spline, fill_jets, fill_values
 from ..errors import FitError, InputError
 from ..validation import Array, Bounds
+from .blocks import blocks
 from .mask import uniform_spacing
-from .smoothing import (
-    FEATURES_PER_SCALE,
-    ChangeMeter,
-    Smoothing,
-    blocks,
-    smooth,
-    smooth_in_place,
-)
+from .smoothing import FEATURES_PER_SCALE, ChangeMeter, Smoothing, smooth, smooth_in_place
 
 Function = Callable[[Array, Array], Array]
 

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import spsolve
 
 from ..errors import MapError
 from ..validation import Array
-from .smoothing import blocks
+from .blocks import blocks
 
 Cells = npt.NDArray[np.bool_]
 

@@ -145,7 +145,6 @@ class Raster:
         raster._require_data()
         blocked = raster._fill(fill_holes, kinds or ["rise"] * len(names))
         x, y = raster.grid.centres()
-        options: dict[str, Any] = {} if kinds is None else {"kinds": kinds}
         try:
             return Surface.from_grid(
                 raster.bands,
@@ -155,9 +154,9 @@ class Raster:
                 names=names,
                 units=units,
                 weights=weights,
+                kinds=kinds,
                 nodata=Mask(blocked, x, y) if blocked.any() else None,
                 georeference=raster._georeference(),
-                **options,
             )
         except MemoryError:
             raise InputError(

@@ -8,11 +8,11 @@ from scipy.ndimage import map_coordinates
 from .._kernels.surfaces import Spline, fill_values
 from ..errors import MapError
 from ..validation import Array
+from .blocks import blocks
 from .fitting import interpolate
 from .georeference import transformer
 from .grid import SAME_PLACE, Grid
 from .holes import continue_into_holes, missing_cells
-from .smoothing import blocks
 
 LEAST_FOR_SPLINE = 4  # cells a side
 

@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
 from ..validation import Array, Bounds, require_not_negative
+from .blocks import blocks
 
 FEATURES_PER_SCALE = 2.0  # a resolution of half a standard deviation, as for Gaussian peaks
-BLOCK = 2**20  # values that are worked on at once
 SLOPE_ERROR = 0.01  # rms slope that rounded heights may leave: 1 %, half a degree
 FEWEST_LEVELS = 16  # of distinct heights, from which their step can be told
 MOST_LOOKED_AT = 1_000_000  # heights that the step is sought in
-
-
-def blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of ``count`` lines, each of ``width`` values, that hold a block together."""
-    size = max(1, BLOCK // max(width, 1))
-    for start in range(0, count, size):
-        yield slice(start, min(start + size, count))
 
 
 @dataclass(frozen=True)

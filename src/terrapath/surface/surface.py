@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -18,41 +18,16 @@ from ..validation import (
     as_array,
     as_bounds,
     as_points,
-    require_choice,
     require_not_negative,
     require_positive,
 )
+from .blocks import blocks
 from .costs import limited, require_costs, with_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
+from .layers import Layer, make_layers, weights_of
 from .mask import Mask
-from .smoothing import FEATURES_PER_SCALE, Smoothing, blocks, check_scale
-
-Kind = Literal["rise", "cost"]
-
-
-@dataclass(frozen=True)
-class Layer:
-    """One scalar field over the plane.
-
-    The weight multiplies the layer where it becomes a coordinate of R^n: a change of
-    one unit of the layer counts as ``weight`` map units of way. So it is with the kind "rise",
-    whose changes cost. Of the kind "cost" the level costs: lengths are multiplied by the layer
-    to the power of ``weight``.
-    """
-
-    name: str
-    unit: str = ""
-    weight: float = 1.0
-    kind: Kind = "rise"
-
-    def __str__(self) -> str:
-        unit = f" [{self.unit}]" if self.unit else ""
-        if self.kind == "cost":
-            power = f" ^ {self.weight:g}" if self.weight != 1.0 else ""
-            return f"cost {self.name}{unit}{power}"
-        weight = f" x {self.weight:g}" if self.weight != 1.0 else ""
-        return f"{self.name}{unit}{weight}"
+from .smoothing import FEATURES_PER_SCALE, Smoothing, check_scale
 
 
 @dataclass(frozen=True)
@@ -103,37 +78,6 @@ def _steepest(data: Peaks | Spline) -> float:
 
 
 EXACT = Fit("exact Gaussian peaks", 0.0, 0.0)
-
-
-def _make_layers(
-    count: int,
-    names: Sequence[str] | None,
-    units: Sequence[str] | None,
-    weights: Sequence[float] | None,
-    kinds: Sequence[str] | None = None,
-) -> tuple[Layer, ...]:
-    """Layers with defaults: the first is the height, the others are numbered as x_k."""
-    kinds = ["rise"] * count if kinds is None else kinds
-    names = ["height", *(f"x{k}" for k in range(4, count + 3))] if names is None else names
-    units = [""] * count if units is None else units
-    weights = [1.0] * count if weights is None else weights
-    lists = (("names", names), ("units", units), ("weights", weights), ("kinds", kinds))
-    for what, given in lists:
-        if len(given) != count:
-            raise InputError(f"{what} has {len(given)} entries for {count} layers; give one each")
-    if len(set(names)) != count:
-        raise InputError(f"names={list(names)} repeats a name; layers need distinct names")
-    for name, weight, kind in zip(names, weights, kinds, strict=True):
-        require_not_negative(**{f"the weight of {name}": weight})
-        require_choice(("rise", "cost"), **{f"the kind of {name}": kind})
-    return tuple(
-        Layer(str(n), str(u), float(w), "cost" if k == "cost" else "rise")
-        for n, u, w, k in zip(names, units, weights, kinds, strict=True)
-    )
-
-
-def _weights(layers: Sequence[Layer]) -> Array:
-    return np.array([layer.weight for layer in layers])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,7 +136,7 @@ class Surface:
                 f"falloff={peaks[:, 1].min():g} must be above 0; a peak is "
                 "(amplitude, falloff, x1, x2) with the value amplitude * exp(-falloff * r^2)"
             )
-        made = _make_layers(len(layers), names, units, weights)
+        made = make_layers(len(layers), names, units, weights)
         first = np.cumsum([0, *(len(row) for row in rows)]).astype(np.int64)
         # Half of the standard deviation of the sharpest peak.
         resolution = math.inf if len(peaks) == 0 else 0.5 / math.sqrt(2.0 * peaks[:, 1].max())
@@ -236,7 +180,7 @@ class Surface:
             if not (np.diff(axis) > 0.0).all():
                 raise InputError(f"{name} does not increase; flip it, and the values with it")
         array = as_array(array, "values", shape=(None, len(y), len(x)))
-        made = _make_layers(len(array), names, units, weights, kinds)
+        made = make_layers(len(array), names, units, weights, kinds)
         is_cost = np.array([layer.kind == "cost" for layer in made])
         rises = tuple(layer for layer in made if layer.kind == "rise")
         costs = tuple(layer for layer in made if layer.kind == "cost")
@@ -247,11 +191,11 @@ class Surface:
             )
         bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
         scale = check_scale(smoothing, bounds)
-        found = fit_grid(array[~is_cost] if costs else array, x, y, _weights(rises), scale)
+        found = fit_grid(array[~is_cost] if costs else array, x, y, weights_of(rises), scale)
         logs = None
         if costs:
             require_costs(array[is_cost], x, y, [layer.name for layer in costs])
-            fitted = fit_grid(np.log(array[is_cost]), x, y, _weights(costs), scale)
+            fitted = fit_grid(np.log(array[is_cost]), x, y, weights_of(costs), scale)
             logs = limited(fitted.spline)
         fit = Fit(
             f"bicubic spline through {len(x)} x {len(y)} samples",
@@ -294,7 +238,7 @@ class Surface:
             found = fit_smoothed(f, rectangle, scale)
         else:
             found = fit_function(f, rectangle, tolerance, gradient)
-        made = _make_layers(len(found.spline.weights), names, units, weights)
+        made = make_layers(len(found.spline.weights), names, units, weights)
         fit = Fit(
             "bicubic spline of a function, {} x {} samples".format(*found.samples),
             found.value_error,
@@ -348,10 +292,10 @@ class Surface:
             )
             for k in (self.layers, self.costs)
         )
-        data: Peaks | Spline = self.data._replace(weights=_weights(layers))
+        data: Peaks | Spline = self.data._replace(weights=weights_of(layers))
         logs = self.cost_data
         if logs is not None and isinstance(data, Spline):
-            logs = logs._replace(weights=_weights(costs))
+            logs = logs._replace(weights=weights_of(costs))
             data = with_costs(data, logs)
         return replace(self, data=data, layers=layers, costs=costs, cost_data=logs)
 
