@@ -5,38 +5,34 @@ import math
 import numpy as np
 
 from .compiler import allocating_kernel, inner_kernel, kernel
-from .surfaces import floor_of, metric_at, value_at
+from .four import four, sqrt, total
+from .surfaces import floor_of, metric_at, metric_inside, value_at
 
 
 @inner_kernel
 def norm(h, dx, dy):
     """Length sqrt(h(v, v)) of the vector v = (dx, dy)."""
-    return math.sqrt(h.h11 * dx * dx + 2.0 * h.h12 * dx * dy + h.h22 * dy * dy)
+    return sqrt(h.h11 * (dx * dx) + h.h12 * (2.0 * dx * dy) + h.h22 * (dy * dy))
 
 
-@kernel
+@inner_kernel
 def composite_boole(surface, ax, ay, ha, bx, by, hb, panels):
     """Line-R with the segment cut into equal panels; ``panels = 1`` is Algorithm 1.
 
     ha and hb are the metric at the ends, which a tree keeps for each of its nodes.
     """
-    dx, dy = bx - ax, by - ay
-    total = 7.0 / 90.0 * (norm(ha, dx, dy) + norm(hb, dx, dy))
-    intervals = 4 * panels
-    for k in range(1, intervals):
-        t = k / intervals
-        h = metric_at(surface, t * bx + (1.0 - t) * ax, t * by + (1.0 - t) * ay)
-        place = k % 4
-        weight = 16.0 / 45.0
-        if place == 2:
-            weight = 2.0 / 15.0
-        elif place == 0:
-            weight = 7.0 / 45.0
-        total += weight * norm(h, dx, dy)
-    return total / panels
+    dx, dy = (bx - ax) / panels, (by - ay) / panels
+    length = 7.0 / 90.0 * (norm(ha, dx, dy) + norm(hb, dx, dy))
+    weights = four(16.0 / 45.0, 2.0 / 15.0, 16.0 / 45.0, 0.0)
+    for k in range(panels):
+        x, y = ax + k * dx, ay + k * dy
+        if k > 0:
+            length += 7.0 / 45.0 * norm(metric_at(surface, x, y), dx, dy)
+        length += total(weights * norm(metric_inside(surface, x, y, dx, dy), dx, dy))
+    return length
 
 
-@kernel
+@inner_kernel
 def line_r(surface, ax, ay, bx, by):
     """Length of the segment a-b under h by the 5-point Newton-Cotes rule (Algorithm 1)."""
     ha = metric_at(surface, ax, ay)

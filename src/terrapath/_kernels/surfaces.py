@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .compiler import inner_kernel, kernel, per_class
+from .four import exp, four, four_in_row, fused, total
 
 
 class Peaks(NamedTuple):
@@ -71,7 +72,7 @@ def peaks_value(surface, layer, x, y):
     for p in range(surface.first[layer], surface.first[layer + 1]):
         dx = x - surface.peaks[p, 2]
         dy = y - surface.peaks[p, 3]
-        total += surface.peaks[p, 0] * math.exp(-surface.peaks[p, 1] * (dx * dx + dy * dy))
+        total += surface.peaks[p, 0] * exp(-surface.peaks[p, 1] * (dx * dx + dy * dy))
     return total
 
 
@@ -82,7 +83,7 @@ def peaks_jet(surface, layer, x, y):
         dx = x - surface.peaks[p, 2]
         dy = y - surface.peaks[p, 3]
         c = -2.0 * surface.peaks[p, 1]
-        g = surface.peaks[p, 0] * math.exp(0.5 * c * (dx * dx + dy * dy))
+        g = surface.peaks[p, 0] * exp(0.5 * c * (dx * dx + dy * dy))
         f += g
         fx += c * dx * g
         fy += c * dy * g
@@ -94,14 +95,15 @@ def peaks_jet(surface, layer, x, y):
 
 @inner_kernel
 def peaks_metric(surface, x, y):
-    h11, h12, h22 = 1.0, 0.0, 1.0
+    none = 0.0 * x
+    h11, h12, h22 = none + 1.0, none, none + 1.0
     for layer in range(surface.weights.shape[0]):
-        fx, fy = 0.0, 0.0
+        fx, fy = none, none
         for p in range(surface.first[layer], surface.first[layer + 1]):
             dx = x - surface.peaks[p, 2]
             dy = y - surface.peaks[p, 3]
             falloff = surface.peaks[p, 1]
-            g = surface.peaks[p, 0] * falloff * math.exp(-falloff * (dx * dx + dy * dy))
+            g = surface.peaks[p, 0] * falloff * exp(-falloff * (dx * dx + dy * dy))
             fx -= dx * g
             fy -= dy * g
         w = 4.0 * surface.weights[layer] * surface.weights[layer]
@@ -117,8 +119,8 @@ def peaks_metric(surface, x, y):
 @inner_kernel
 def spline_cell(surface, x, y):
     """The cell of (x, y), clamped to the outermost cells."""
-    s = (x - surface.x0) / surface.dx
-    t = (y - surface.y0) / surface.dy
+    s = (x - surface.x0) * (1.0 / surface.dx)
+    t = (y - surface.y0) * (1.0 / surface.dy)
     i = min(max(math.floor(s), 0), surface.coefficients.shape[2] - 4)
     j = min(max(math.floor(t), 0), surface.coefficients.shape[1] - 4)
     return Cell(i, j, s - i, t - j)
@@ -127,49 +129,42 @@ def spline_cell(surface, x, y):
 @inner_kernel
 def basis(u):
     """The four uniform cubic B-splines that are alive at u in [0, 1]."""
-    r = 1.0 - u
-    return (
-        r * r * r / 6.0,
-        (4.0 - 6.0 * u * u + 3.0 * u * u * u) / 6.0,
-        (4.0 - 6.0 * r * r + 3.0 * r * r * r) / 6.0,
-        u * u * u / 6.0,
-    )
+    constant, linear = four(1 / 6, 2 / 3, 1 / 6, 0.0), four(-0.5, 0.0, 0.5, 0.0)
+    square, cube = four(0.5, -1.0, 0.5, 0.0), four(-1 / 6, 0.5, -0.5, 1 / 6)
+    return fused(fused(fused(cube, u, square), u, linear), u, constant)
 
 
 @inner_kernel
 def basis_slope(u):
     """First derivatives of ``basis``."""
-    r = 1.0 - u
-    return -0.5 * r * r, u * (1.5 * u - 2.0), r * (2.0 - 1.5 * r), 0.5 * u * u
+    constant, linear, square = (
+        four(-0.5, 0.0, 0.5, 0.0),
+        four(1.0, -2.0, 1.0, 0.0),
+        four(-0.5, 1.5, -1.5, 0.5),
+    )
+    return fused(fused(square, u, linear), u, constant)
 
 
 @inner_kernel
 def basis_curvature(u):
     """Second derivatives of ``basis``."""
-    return 1.0 - u, 3.0 * u - 2.0, 1.0 - 3.0 * u, u
+    return fused(four(-1.0, 3.0, -3.0, 1.0), u, four(1.0, -2.0, 1.0, 0.0))
 
 
 @inner_kernel
-def along_row(coefficients, layer, row, i, b):
-    """Sum over the four coefficients of a row, weighted by b."""
-    return (
-        b[0] * coefficients[layer, row, i]
-        + b[1] * coefficients[layer, row, i + 1]
-        + b[2] * coefficients[layer, row, i + 2]
-        + b[3] * coefficients[layer, row, i + 3]
-    )
+def column_sums(coefficients, layer, cell, by):
+    """Sums over the four columns of coefficients of a cell, weighted by ``by``."""
+    i, j = cell.i, cell.j
+    sums = by[0] * four_in_row(coefficients, layer, j, i)
+    sums = fused(by[1], four_in_row(coefficients, layer, j + 1, i), sums)
+    sums = fused(by[2], four_in_row(coefficients, layer, j + 2, i), sums)
+    return fused(by[3], four_in_row(coefficients, layer, j + 3, i), sums)
 
 
 @inner_kernel
 def tensor_sum(coefficients, layer, cell, bx, by):
     """Sum over the sixteen coefficients of a cell, weighted by bx times by."""
-    i, j = cell.i, cell.j
-    return (
-        by[0] * along_row(coefficients, layer, j, i, bx)
-        + by[1] * along_row(coefficients, layer, j + 1, i, bx)
-        + by[2] * along_row(coefficients, layer, j + 2, i, bx)
-        + by[3] * along_row(coefficients, layer, j + 3, i, bx)
-    )
+    return total(bx * column_sums(coefficients, layer, cell, by))
 
 
 @inner_kernel
@@ -204,18 +199,37 @@ def spline_metric(surface, x, y):
     cell = spline_cell(surface, x, y)
     bx, by = basis(cell.u), basis(cell.v)
     sx, sy = basis_slope(cell.u), basis_slope(cell.v)
+    per_x, per_y = 1.0 / surface.dx, 1.0 / surface.dy
     h11, h12, h22 = 1.0, 0.0, 1.0
     for layer in range(surface.weights.shape[0]):
         w = surface.weights[layer]
-        fx = w * tensor_sum(surface.coefficients, layer, cell, sx, by) / surface.dx
-        fy = w * tensor_sum(surface.coefficients, layer, cell, bx, sy) / surface.dy
+        fx = w * per_x * tensor_sum(surface.coefficients, layer, cell, sx, by)
+        fy = w * per_y * tensor_sum(surface.coefficients, layer, cell, bx, sy)
         h11 += fx * fx
         h12 += fx * fy
         h22 += fy * fy
     if surface.log_cost.shape[0] > 0:
-        c2 = math.exp(2.0 * tensor_sum(surface.log_cost, 0, cell, bx, by))
+        c2 = exp(2.0 * tensor_sum(surface.log_cost, 0, cell, bx, by))
         return Metric(c2 * h11, c2 * h12, c2 * h22)
     return Metric(h11, h12, h22)
+
+
+@inner_kernel
+def peaks_metric_inside(surface, x, y, dx, dy):
+    quarters = four(0.25, 0.5, 0.75, 1.0)
+    return peaks_metric(surface, fused(quarters, dx, x), fused(quarters, dy, y))
+
+
+@inner_kernel
+def spline_metric_inside(surface, x, y, dx, dy):
+    a = spline_metric(surface, x + 0.25 * dx, y + 0.25 * dy)
+    b = spline_metric(surface, x + 0.5 * dx, y + 0.5 * dy)
+    c = spline_metric(surface, x + 0.75 * dx, y + 0.75 * dy)
+    return Metric(
+        four(a.h11, b.h11, c.h11, c.h11),
+        four(a.h12, b.h12, c.h12, c.h12),
+        four(a.h22, b.h22, c.h22, c.h22),
+    )
 
 
 @inner_kernel
@@ -258,6 +272,14 @@ def metric_at(surface, x, y):
     """H = c^2 (I + sum_k w_k^2 grad x_k grad x_k^T) (paper, section 3.2; c is 1 there)."""
 
 
+@per_class({Peaks: peaks_metric_inside, Spline: spline_metric_inside})
+def metric_inside(surface, x, y, dx, dy):
+    """H at a quarter, a half and three quarters of the way from (x, y) on by (dx, dy), as fours.
+
+    What the last of four is does not matter.
+    """
+
+
 @per_class({Peaks: peaks_log_cost, Spline: spline_log_cost})
 def log_cost_at(surface, x, y):
     """The jet of log c."""
@@ -279,31 +301,26 @@ def fill_values(surface, points, values):
             values[m, layer] = value_at(surface, layer, points[m, 0], points[m, 1])
 
 
+@inner_kernel
+def put_jet(row, jet):
+    """Write a jet into a row (6,)."""
+    row[0], row[1], row[2] = jet.f, jet.fx, jet.fy
+    row[3], row[4], row[5] = jet.fxx, jet.fxy, jet.fyy
+
+
 @kernel
 def fill_jets(surface, points, jets):
     """Jets (m, layers, 6)."""
     for m in range(points.shape[0]):
         for layer in range(surface.weights.shape[0]):
-            jet = jet_at(surface, layer, points[m, 0], points[m, 1])
-            jets[m, layer, 0] = jet.f
-            jets[m, layer, 1] = jet.fx
-            jets[m, layer, 2] = jet.fy
-            jets[m, layer, 3] = jet.fxx
-            jets[m, layer, 4] = jet.fxy
-            jets[m, layer, 5] = jet.fyy
+            put_jet(jets[m, layer], jet_at(surface, layer, points[m, 0], points[m, 1]))
 
 
 @kernel
 def fill_log_costs(surface, points, jets):
     """Jets (m, 6) of log c."""
     for m in range(points.shape[0]):
-        jet = log_cost_at(surface, points[m, 0], points[m, 1])
-        jets[m, 0] = jet.f
-        jets[m, 1] = jet.fx
-        jets[m, 2] = jet.fy
-        jets[m, 3] = jet.fxx
-        jets[m, 4] = jet.fxy
-        jets[m, 5] = jet.fyy
+        put_jet(jets[m], log_cost_at(surface, points[m, 0], points[m, 1]))
 
 
 @kernel

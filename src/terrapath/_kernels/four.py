@@ -1,0 +1,244 @@
+"""Four numbers at once: an array (4,) in plain Python, one vector in compiled kernels.
+
+LLVM turns loops over arrays into vector instructions, but neither a sum over the sixteen
+coefficients of a spline nor an exponential in the middle of a formula. Each function here is
+what it says in Python; ``_lowered_by`` tells the compiler the instructions to put in its
+place. A number beside a ``Four`` stands for four of it. Every operation is one that IEEE 754
+defines, in a fixed order, so the bits are the same on every processor.
+"""
+
+import math
+import operator
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models, register_default
+from numba.core.imputils import lower_builtin, lower_cast
+from numba.core.typeconv import Conversion
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+
+_DOUBLE, _LANE = ir.DoubleType(), ir.IntType(32)
+_VECTOR, _BITS = ir.VectorType(_DOUBLE, 4), ir.VectorType(ir.IntType(64), 4)
+
+
+class FourType(types.Type):
+    """What the compiler knows four numbers by."""
+
+    def __init__(self):
+        super().__init__("Four")
+
+    def can_convert_from(self, context, other):
+        return Conversion.safe if isinstance(other, types.Number) else None
+
+    def unify(self, context, other):
+        return self if isinstance(other, types.Number) else None
+
+
+_FOUR = FourType()
+
+
+@register_default(FourType)
+class _FourModel(models.PrimitiveModel):
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, _VECTOR)
+
+
+@lower_cast(types.Number, FourType)
+def _splat(context, builder, kind, _, number):
+    number = context.cast(builder, number, kind, types.float64)
+    first = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), number, _LANE(0))
+    places = ir.Constant(ir.VectorType(_LANE, 4), [0] * 4)
+    return builder.shuffle_vector(first, ir.Constant(_VECTOR, ir.Undefined), places)
+
+
+def _lowered_by(build, resolve, *kinds):
+    """Compile calls of a function by ``build``, for the argument types that ``resolve`` takes."""
+
+    def declare(function):
+        class Template(AbstractTemplate):
+            key = function
+
+            def generic(self, args, kws):
+                return resolve(*args)
+
+        infer_global(function, types.Function(Template))
+        lower_builtin(function, *kinds)(build)
+        return function
+
+    return declare
+
+
+def _all_four(*args):
+    """Fours in, a Four out, where any argument is one."""
+    return signature(_FOUR, *[_FOUR] * len(args)) if _FOUR in args else None
+
+
+# Operators
+
+
+def _arithmetic(instruction):
+    return lambda context, builder, signature, args: getattr(builder, instruction)(*args)
+
+
+for _operator, _instruction in {
+    operator.add: "fadd",
+    operator.sub: "fsub",
+    operator.mul: "fmul",
+    operator.iadd: "fadd",
+    operator.isub: "fsub",
+}.items():
+    _lowered_by(_arithmetic(_instruction), _all_four, FourType, FourType)(_operator)
+
+
+def _lane(context, builder, signature, args):
+    return builder.extract_element(*args)
+
+
+def _lane_of(four, lane):
+    is_lane = four == _FOUR and isinstance(lane, types.Integer)
+    return signature(types.float64, four, types.intp) if is_lane else None
+
+
+_lowered_by(_lane, _lane_of, FourType, types.intp)(operator.getitem)
+
+
+# Functions
+
+
+def _put_together(context, builder, signature, args):
+    vector = ir.Constant(_VECTOR, ir.Undefined)
+    for lane, number in enumerate(args):
+        vector = builder.insert_element(vector, number, _LANE(lane))
+    return vector
+
+
+@_lowered_by(
+    _put_together,
+    lambda *args: signature(_FOUR, *[types.float64] * 4),
+    *[types.float64] * 4,
+)
+def four(a, b, c, d):
+    """Put four numbers together."""
+    return np.array((a, b, c, d))
+
+
+def _load(context, builder, signature, args):
+    array = context.make_array(signature.args[0])(context, builder, args[0])
+    shape = cgutils.unpack_tuple(builder, array.shape, 3)
+    strides = cgutils.unpack_tuple(builder, array.strides, 3)
+    first = cgutils.get_item_pointer2(
+        context, builder, array.data, shape, strides, signature.args[0].layout, args[1:]
+    )
+    return builder.load(builder.bitcast(first, _VECTOR.as_pointer()), align=8)
+
+
+@_lowered_by(
+    _load,
+    lambda array, *_: signature(_FOUR, array, *[types.intp] * 3),
+    types.Array,
+    *[types.intp] * 3,
+)
+def four_in_row(array, k, j, i):
+    """The four entries of a float64 array (., ., .) from (k, j, i) on."""
+    return array[k, j, i : i + 4]
+
+
+def _intrinsic(builder, name, *args):
+    """Call an intrinsic function of LLVM's, of numbers or of fours."""
+    kind = args[0].type
+    suffix = "v4f64" if kind == _VECTOR else "f64"
+    function_type = ir.FunctionType(kind, [kind] * len(args))
+    function = cgutils.get_or_insert_function(builder.module, function_type, f"{name}.{suffix}")
+    return builder.call(function, args)
+
+
+def _fma(builder, a, b, c):
+    return _intrinsic(builder, "llvm.fma", a, b, c)
+
+
+def _fused(context, builder, signature, args):
+    return _fma(builder, *args)
+
+
+@_lowered_by(_fused, _all_four, FourType, FourType, FourType)
+def fused(a, b, c):
+    """The sum a b + c; rounded once where it is compiled."""
+    return a * b + c
+
+
+def _total(context, builder, signature, args):
+    def half(first):
+        places = ir.Constant(ir.VectorType(_LANE, 2), [first, first + 1])
+        return builder.shuffle_vector(args[0], ir.Constant(_VECTOR, ir.Undefined), places)
+
+    pair = builder.fadd(half(0), half(2))
+    return builder.fadd(*(builder.extract_element(pair, _LANE(lane)) for lane in range(2)))
+
+
+@_lowered_by(_total, lambda v: signature(types.float64, _FOUR), FourType)
+def total(v):
+    """The sum of the four, the first with the third and the second with the fourth first."""
+    return (v[0] + v[2]) + (v[1] + v[3])
+
+
+# The exponential
+
+
+def _number_or_four(x):
+    return signature(_FOUR, x) if x == _FOUR else signature(types.float64, types.float64)
+
+
+# Cody and Waite (1980): e^x = 2^n e^r with n = round(x / log 2), so that |r| <= (log 2) / 2;
+# there the Taylor polynomial of degree 13 is within 1e-17. log 2 is split such that n times
+# its first part is exact. A large number is added for its last bits to hold n.
+_LOWEST, _HIGHEST = -708.0, 709.0
+_SHIFT = 1.5 * 2.0**52
+_LOG2_HIGH, _LOG2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
+_TAYLOR = [1.0 / math.factorial(k) for k in range(13, -1, -1)]
+
+
+def _exp_of_four(context, builder, signature, args):
+    def constant(number):
+        return ir.Constant(_VECTOR, [number] * 4)
+
+    x = args[0]
+    for sign, limit in (("<", _LOWEST), (">", _HIGHEST)):
+        beyond = builder.fcmp_ordered(sign, x, constant(limit))
+        x = builder.select(beyond, constant(limit), x)
+    shifted = _fma(builder, x, constant(1.0 / math.log(2.0)), constant(_SHIFT))
+    n = builder.fsub(shifted, constant(_SHIFT))
+    r = _fma(builder, n, constant(-_LOG2_HIGH), x)
+    r = _fma(builder, n, constant(-_LOG2_LOW), r)
+    power = constant(_TAYLOR[0])
+    for coefficient in _TAYLOR[1:]:
+        power = _fma(builder, power, r, constant(coefficient))
+    exponent = builder.shl(builder.bitcast(shifted, _BITS), ir.Constant(_BITS, [52] * 4))
+    return builder.bitcast(builder.add(builder.bitcast(power, _BITS), exponent), _VECTOR)
+
+
+def _exp_of_number(context, builder, signature, args):
+    return _intrinsic(builder, "llvm.exp", args[0])
+
+
+@_lowered_by(_exp_of_number, _number_or_four, types.float64)
+def exp(x):
+    """e^x of a number or of four: these within 1e-15, between e^-708 and e^709."""
+    return np.exp(x)
+
+
+lower_builtin(exp, FourType)(_exp_of_four)
+
+
+def _sqrt(context, builder, signature, args):
+    return _intrinsic(builder, "llvm.sqrt", args[0])
+
+
+@_lowered_by(_sqrt, _number_or_four, types.float64)
+def sqrt(x):
+    """The square root of a number or of four."""
+    return np.sqrt(x)
+
+
+lower_builtin(sqrt, FourType)(_sqrt)
