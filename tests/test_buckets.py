@@ -7,40 +7,60 @@ from hypothesis import strategies as st
 
 from oracles import nearest_by_force, within_by_force
 from terrapath._kernels import buckets as kernels
-from terrapath._kernels.tree import CANDIDATE, VERTEX
+from terrapath._kernels.tree import CANDIDATE
 
 X0, Y0, WIDTH, HEIGHT = -3.0, 2.0, 8.0, 4.0
+
+
+def points_at(x, y):
+    """Rows with x and y, and with what the search does not read."""
+    return np.column_stack([x, y, np.full(len(x), np.nan)])
+
+
+def lay_out(buckets, points, count, side, width=WIDTH, height=HEIGHT):
+    """Lay out the first points, and put them in their order; put the others in one by one."""
+    numbers = np.full(len(points), -9, np.int32)
+    kernels.resize(buckets, width, height, side)
+    kernels.lay_out(buckets, points, count, numbers)
+    assert numbers[0] == 0
+    assert sorted(numbers[:count]) == list(range(count))
+    points[numbers[:count]] = points[:count].copy()
+    for p in range(count, len(points)):
+        kernels.put(buckets, points, p)
 
 
 def make(x, y, side, count=None, room=64, frame=(X0, Y0, WIDTH, HEIGHT)):
     """Buckets with the first ``count`` points laid out, and the others put in one by one."""
     x0, y0, width, height = frame
-    points = np.zeros(len(x), VERTEX).view(np.recarray)
-    points.x, points.y, points.next = x, y, -7  # -7: no list may be followed into an old one
+    points = points_at(x, y)
     buckets = kernels.Buckets(
-        np.full(room, -5, np.int32), np.array([x0, y0, 0.0]), np.zeros(2, np.int64)
+        first=np.full(room + 1, -3, np.int32),
+        head=np.full(room, -5, np.int32),
+        next=np.full(len(x), -7, np.int32),  # no list may be followed into an old one
+        frame=np.array([x0, y0, 0.0]),
+        shape=np.zeros(2, np.int64),
     )
-    count = len(x) if count is None else count
-    kernels.rebuild(buckets, points, count, width, height, side)
-    for p in range(count, len(x)):
-        kernels.put(buckets, points, p)
+    lay_out(buckets, points, len(x) if count is None else count, side, width, height)
     return buckets, points
 
 
 def found_within(buckets, points, at, radius):
-    found = np.zeros(len(points), CANDIDATE).view(np.recarray)
+    found = np.zeros(len(points) + 1, CANDIDATE).view(np.recarray)
     count = kernels.within(buckets, points, at[0], at[1], radius, found)
     listed = found.vertex[:count].tolist()
     assert len(set(listed)) == len(listed)
+    squared = ((points[listed, :2] - at) ** 2).sum(axis=1)
+    np.testing.assert_allclose(found.squared[:count], squared, rtol=1e-12)
     return set(listed)
 
 
 def check(buckets, points, places, radii):
+    x, y = points[:, 0], points[:, 1]
     for at in places:
-        expected = nearest_by_force(points.x, points.y, at)
+        expected = nearest_by_force(x, y, at)
         assert kernels.nearest(buckets, points, at[0], at[1]) == expected
         for radius in radii:
-            expected = within_by_force(points.x, points.y, at, radius)
+            expected = within_by_force(x, y, at, radius)
             assert found_within(buckets, points, at, radius) == expected
 
 
@@ -68,14 +88,13 @@ def spread(kind, count, random):
 def test_nearest_and_within_find_what_a_search_through_all_finds(kind, seed, count, side, room):
     random = np.random.default_rng(seed)
     x, y = spread(kind, count, random)
-    laid_out = int(random.integers(0, count + 1))
+    laid_out = int(random.integers(1, count + 1))
     buckets, points = make(x, y, side, laid_out, room)
     places = [*np.column_stack(spread(random.choice(["uniform", kind]), 6, random)), (x[0], y[0])]
     radii = [0.0, 0.3, 1.0, 2.5, 20.0]
     check(buckets, points, places, radii)
     # Laid out anew, coarser or finer, the same is found.
-    finer = side * random.uniform(0.1, 3.0)
-    kernels.rebuild(buckets, points, count, WIDTH, HEIGHT, finer)
+    lay_out(buckets, points, count, side * random.uniform(0.1, 3.0))
     check(buckets, points, places, radii)
 
 
@@ -87,7 +106,8 @@ def test_places_beyond_the_border_are_answered_too(seed, side):
     buckets, points = make(x, y, side)
     places = random.uniform((X0 - 5, Y0 - 5), (X0 + WIDTH + 5, Y0 + HEIGHT + 5), (10, 2))
     for at in places:
-        assert found_within(buckets, points, at, 4.0) == within_by_force(x, y, at, 4.0)
+        expected = within_by_force(points[:, 0], points[:, 1], at, 4.0)
+        assert found_within(buckets, points, at, 4.0) == expected
 
 
 @given(
@@ -105,18 +125,25 @@ def test_the_buckets_never_outgrow_their_room_and_are_never_finer_than_asked(
     columns, rows = buckets.shape
     assert 1 <= columns * rows <= room
     assert buckets.frame[2] >= side
-    listed = []
-    for head in buckets.head[: columns * rows]:
-        p = head
-        while p >= 0:
-            listed.append(int(p))
-            p = points.next[p]
-    assert sorted(listed) == [0, 1, 2]
+    first = buckets.first[: columns * rows + 1]
+    assert first[0] == 1  # the very first point is a later one of its bucket
+    assert first[-1] == len(points)
+    assert (np.diff(first) >= 0).all()
+    heads = buckets.head[: columns * rows]
+    assert heads.max() == 0
+    assert (heads >= 0).sum() == 1
+    for cell in range(columns * rows):
+        for p in range(first[cell], first[cell + 1]):
+            column, row = (
+                kernels.column_of(buckets, points[p, 0]),
+                kernels.row_of(buckets, points[p, 1]),
+            )
+            assert row * columns + column == cell
 
 
 def test_of_several_nearest_points_the_first_is_found():
     x, y = np.array([1.0, 0.0, 0.0, 1.0]), np.array([3.0, 3.0, 3.0, 3.0])
-    for count in range(5):
+    for count in range(1, 3):  # more would be numbered anew
         buckets, points = make(x, y, 0.5, count)
         assert kernels.nearest(buckets, points, 0.5, 3.0) == 0
         assert kernels.nearest(buckets, points, 0.1, 3.0) == 1

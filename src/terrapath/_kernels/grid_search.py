@@ -12,8 +12,7 @@ import numpy as np
 
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
-from .rrt_star import edge_length
-from .tree import chord_between, survey
+from .tree import COST, X, Y, chord_between, edge_length, survey
 
 # Places in Graph.counters.
 OPEN = 0  # vertices in the heap
@@ -30,15 +29,12 @@ UNSEEN = 0
 DONE = -1
 WITHOUT_WAY = -2
 
-# A vertex, 56 bytes: all that an edge needs to know of its end, and its slot of the heap.
+# A vertex: the metric, the way to it, and its slot of the heap.
 VERTEX = np.dtype(
     [
-        ("x", np.float64),
-        ("y", np.float64),
         ("h11", np.float64),  # the metric at the vertex
         ("h12", np.float64),
         ("h22", np.float64),
-        ("cost", np.float64),  # length from the start
         ("parent", np.int32),  # -1 at the start
         ("slot", np.int32),
     ]
@@ -65,7 +61,7 @@ class Graph(NamedTuple):
     """
 
     vertices: np.ndarray  # (nx * ny + 2,) VERTEX, zeros before they are seen
-    lifted: np.ndarray  # (nx * ny + 2, layers) float64: weighted layer values
+    places: np.ndarray  # (nx * ny + 2, LIFTED + layers) float64, as a tree's
     heap: np.ndarray  # (nx * ny + 3,) ENTRY: the open vertices, four children a slot, from slot 1
     counters: np.ndarray  # (COUNTERS,) int64
     floor: float  # no cost of the surface is below it
@@ -131,8 +127,8 @@ def take_first(vertices, heap, last):
 def place(surface, graph, v, x, y):
     """Write a vertex's position and what is cached with it; no way leads there yet."""
     survey(surface, graph, v, x, y)
+    graph.places[v, COST] = math.inf
     vertex = graph.vertices[v]
-    vertex.cost = math.inf
     vertex.parent = -1
     vertex.slot = WITHOUT_WAY
     graph.counters[VERTICES] += 1
@@ -148,11 +144,10 @@ def discover(surface, nodes, graph, node):
 @kernel
 def enter(graph, options, v):
     """Put a vertex where its cost belongs in the heap."""
-    vertex = graph.vertices[v]
-    key = vertex.cost
+    key = graph.places[v, COST]
     if options.informed:
         key += chord_between(graph, v, graph.vertices.shape[0] - 1)
-    slot = vertex.slot
+    slot = graph.vertices[v].slot
     if slot == WITHOUT_WAY:
         graph.counters[OPEN] += 1
         slot = graph.counters[OPEN]
@@ -162,15 +157,15 @@ def enter(graph, options, v):
 @kernel
 def measure(surface, space, graph, options, u, v, chord):
     """Measure the edge u-v, and let the way to v go through it where that is shorter."""
-    origin, vertex = graph.vertices[u], graph.vertices[v]
+    origin, place = graph.places[u], graph.places[v]
     graph.counters[INTEGRATED] += 1
-    length = max(edge_length(surface, graph.vertices, u, v, options.panel), chord)
-    if not origin.cost + length < vertex.cost:
+    length = max(edge_length(surface, graph, u, v, options.panel), chord)
+    if not origin[COST] + length < place[COST]:
         return
     graph.counters[CHECKED] += 1
-    if segment_is_free(space, origin.x, origin.y, vertex.x, vertex.y):
-        vertex.cost = origin.cost + length
-        vertex.parent = u
+    if segment_is_free(space, origin[X], origin[Y], place[X], place[Y]):
+        place[COST] = origin[COST] + length
+        graph.vertices[v].parent = u
         enter(graph, options, v)
 
 
@@ -185,7 +180,7 @@ def relax(surface, space, nodes, graph, options, u, v):
             discover(surface, nodes, graph, v)
         graph.counters[CONSIDERED] += 1
         chord = chord_between(graph, u, v)
-        if graph.vertices[u].cost + chord < graph.vertices[v].cost:
+        if graph.places[u, COST] + chord < graph.places[v, COST]:
             measure(surface, space, graph, options, u, v, chord)
         else:
             graph.counters[PRUNED] += 1
@@ -238,7 +233,7 @@ def begin(surface, graph, options, start_x, start_y, goal_x, goal_y):
     goal = graph.vertices.shape[0] - 1
     place(surface, graph, goal, goal_x, goal_y)
     place(surface, graph, goal - 1, start_x, start_y)
-    graph.vertices[goal - 1].cost = 0.0
+    graph.places[goal - 1, COST] = 0.0
     enter(graph, options, goal - 1)
 
 

@@ -9,15 +9,14 @@ estimate its true length, and the chord is never above it.
 
 import math
 
-from .buckets import nearest, put, rebuild, within
+from .buckets import lay_out, nearest, put, resize, squared_distance, within
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
-from .lengths import composite_boole
 from .sampling import area_to_search, distance_to_goal, sample
-from .surfaces import Metric
 from .tree import (
     CHECKED,
     CONSIDERED,
+    COST,
     GOAL,
     INTEGRATED,
     LAID_OUT,
@@ -25,23 +24,18 @@ from .tree import (
     REWIRED,
     SAMPLES,
     VERTICES,
+    X,
+    Y,
     adopt,
-    chord_between,
+    edge_length,
     pass_on_cost,
     place,
     release,
+    renumber,
+    squared_rise,
 )
 
 # Measuring edges
-
-
-@kernel
-def edge_length(surface, vertices, a, b, panel):
-    """Length of the edge between two vertices by Line-R, in panels."""
-    p, q = vertices[a], vertices[b]
-    hp, hq = Metric(p.h11, p.h12, p.h22), Metric(q.h11, q.h12, q.h22)
-    panels = max(math.ceil(math.hypot(q.x - p.x, q.y - p.y) / panel), 1)
-    return composite_boole(surface, p.x, p.y, hp, q.x, q.y, hq, panels)
 
 
 @inner_kernel
@@ -52,7 +46,7 @@ def candidate_length(surface, tree, options, new, k):
         candidate.length = candidate.chord
         if options.riemannian:
             tree.counters[INTEGRATED] += 1
-            line_r = edge_length(surface, tree.vertices, new, candidate.vertex, options.panel)
+            line_r = edge_length(surface, tree, new, candidate.vertex, options.panel)
             candidate.length = max(line_r, candidate.chord)
     return candidate.length
 
@@ -63,12 +57,15 @@ def candidate_is_free(space, tree, new, k):
     candidate = tree.near[k]
     if candidate.free < 0:
         tree.counters[CHECKED] += 1
-        p, q = tree.vertices[new], tree.vertices[candidate.vertex]
-        candidate.free = segment_is_free(space, p.x, p.y, q.x, q.y)
+        p, q = tree.places[new], tree.places[candidate.vertex]
+        candidate.free = segment_is_free(space, p[X], p[Y], q[X], q[Y])
     return candidate.free == 1
 
 
 # Growing the tree
+
+# Side of a bucket, in near radii.
+SIDE = 0.35
 
 
 @inner_kernel
@@ -79,41 +76,73 @@ def near_radius(tree, options, vertices):
     return min(options.step, options.radius * math.sqrt(area * math.log(n) / n))
 
 
-@kernel
-def find_near(tree, new, radius, nearest_vertex):
-    """Collect the vertices near the new one, the nearest always among them; return how many."""
-    x, y = tree.vertices[new].x, tree.vertices[new].y
-    count = within(tree.buckets, tree.vertices, x, y, radius, tree.near)
-    listed = False
-    for k in range(count):
-        listed = listed or tree.near[k].vertex == nearest_vertex
-    if not listed:
-        tree.near[count].vertex = nearest_vertex
-        count += 1
-    for k in range(count):
-        candidate = tree.near[k]
-        candidate.chord = chord_between(tree, new, candidate.vertex)
-        candidate.cost = tree.vertices[candidate.vertex].cost
-        candidate.length = -1.0
-        # The nearest vertex's edge was tested before the new vertex was placed.
-        candidate.free = 1 if candidate.vertex == nearest_vertex else -1
-    return count
-
-
-@kernel
-def most_promising(tree, count):
-    """The candidate whose cost plus chord is least."""
-    best = -1
-    least = math.inf
-    for k in range(count):
-        bound = tree.near[k].cost + tree.near[k].chord
-        if bound < least:
-            best, least = k, bound
+@inner_kernel
+def nearest_of(tree, count):
+    """The place among the candidates of the nearest vertex, the first of several."""
+    best = 0
+    for k in range(1, count):
+        squared, least = tree.near[k].squared, tree.near[best].squared
+        is_first = tree.near[k].vertex < tree.near[best].vertex
+        if squared < least or (squared == least and is_first):
+            best = k
     return best
 
 
 @kernel
-def choose_parent(surface, space, tree, options, new, count):
+def steer(tree, options, x, y):
+    """The nearest vertex, and the point at most a step from it towards (x, y)."""
+    origin = nearest(tree.buckets, tree.places, x, y)
+    ox, oy = tree.places[origin, X], tree.places[origin, Y]
+    distance = math.hypot(x - ox, y - oy)
+    if distance > options.step:
+        x = min(max(ox + (x - ox) * (options.step / distance), options.x0), options.x1)
+        y = min(max(oy + (y - oy) * (options.step / distance), options.y0), options.y1)
+    return origin, x, y
+
+
+@kernel
+def find_near(tree, options, radius, x, y):
+    """Collect the vertices near the new point; return where it lies, their count, the nearest.
+
+    Where there are any within the radius, which is at most a step, the nearest is one of
+    them. Elsewhere the tree is steered from the nearest vertex, which is always a candidate.
+    """
+    count = within(tree.buckets, tree.places, x, y, radius, tree.near)
+    if count > 0:
+        return x, y, count, nearest_of(tree, count)
+    origin, x, y = steer(tree, options, x, y)
+    count = within(tree.buckets, tree.places, x, y, radius, tree.near)
+    for k in range(count):
+        if tree.near[k].vertex == origin:
+            return x, y, count, k
+    tree.near[count].vertex = origin
+    tree.near[count].squared = squared_distance(tree.places, origin, x, y)
+    return x, y, count + 1, count
+
+
+@kernel
+def measure_chords(tree, new, count):
+    """Lay out the candidates' chords and costs; return the most promising one.
+
+    That is the one whose cost plus chord is least.
+    """
+    promising = -1
+    least = math.inf
+    for k in range(count):
+        candidate = tree.near[k]
+        rise = squared_rise(tree, new, candidate.vertex)
+        candidate.chord = tree.floor * math.sqrt(candidate.squared + rise)
+        candidate.cost = tree.places[candidate.vertex, COST]
+        candidate.length = -1.0
+        candidate.free = -1
+        bound = candidate.cost + candidate.chord
+        if bound < least:
+            promising, least = k, bound
+    return promising
+
+
+@kernel
+def choose_parent(surface, space, tree, options, new, count, promising):
     """Hang the new vertex below the candidate through which it is cheapest to reach.
 
     False where no candidate's length is finite, as on ground too steep for floating point.
@@ -122,8 +151,7 @@ def choose_parent(surface, space, tree, options, new, count):
     cannot win is never integrated, and since no edge is shorter than its chord, that
     changes nothing but the time taken.
     """
-    promising = most_promising(tree, count)
-    best = -1
+    best, pruned = -1, 0
     least = math.inf
     for turn in range(-1, count):
         k = promising if turn == -1 else turn
@@ -131,14 +159,15 @@ def choose_parent(surface, space, tree, options, new, count):
             continue
         come = tree.near[k].cost
         if options.prune and come + tree.near[k].chord >= least:
-            tree.counters[PRUNED] += 1
+            pruned += 1
             continue
         length = candidate_length(surface, tree, options, new, k)
         if come + length < least and candidate_is_free(space, tree, new, k):
             best, least = k, come + length
+    tree.counters[PRUNED] += pruned
     if best < 0:
         return False
-    adopt(tree.vertices, tree.near[best].vertex, new, tree.near[best].length)
+    adopt(tree, tree.near[best].vertex, new, tree.near[best].length)
     return True
 
 
@@ -150,56 +179,56 @@ def rewire(surface, space, tree, options, new, count):
     Rewiring one candidate can shorten the way to another; looking at that would let the order
     in which the candidates are visited decide the tree.
     """
-    come = tree.vertices[new].cost
+    come, parent, pruned = tree.places[new, COST], tree.vertices[new].parent, 0
     for k in range(count):
         near = tree.near[k].vertex
-        if near == tree.vertices[new].parent:
+        if near == parent:
             continue
         if options.prune and come + tree.near[k].chord >= tree.near[k].cost:
-            tree.counters[PRUNED] += 1
+            pruned += 1
             continue
         length = candidate_length(surface, tree, options, new, k)
         if come + length < tree.near[k].cost and candidate_is_free(space, tree, new, k):
             tree.counters[REWIRED] += 1
             release(tree.vertices, near)
-            adopt(tree.vertices, new, near, length)
-            pass_on_cost(tree.vertices, tree.stack, near)
+            adopt(tree, new, near, length)
+            pass_on_cost(tree, near)
+    tree.counters[PRUNED] += pruned
 
 
 @kernel
-def refresh_buckets(tree, options):
-    """Lay the buckets out anew each time the tree has grown fourfold."""
+def refresh_buckets(tree, options, radius):
+    """Lay buckets and vertices out anew each time the tree has grown by a quarter."""
     count = tree.counters[VERTICES]
-    if count >= 4 * tree.counters[LAID_OUT]:
-        side = 0.5 * near_radius(tree, options, 2 * count)
+    if 4 * count >= 5 * tree.counters[LAID_OUT]:
         width, height = options.x1 - options.x0, options.y1 - options.y0
-        rebuild(tree.buckets, tree.vertices, count, width, height, side)
+        resize(tree.buckets, width, height, SIDE * radius)
+        lay_out(tree.buckets, tree.places, count, tree.stack)
+        renumber(tree, count, tree.stack)
         tree.counters[LAID_OUT] = count
 
 
 @kernel
 def extend(surface, space, tree, options, x, y):
     """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew."""
-    refresh_buckets(tree, options)
     new = tree.counters[VERTICES]
-    origin = nearest(tree.buckets, tree.vertices, x, y)
-    ox, oy = tree.vertices[origin].x, tree.vertices[origin].y
-    distance = math.hypot(x - ox, y - oy)
-    if distance == 0.0:
+    radius = near_radius(tree, options, new)
+    refresh_buckets(tree, options, radius)
+    x, y, count, closest = find_near(tree, options, radius, x, y)
+    if tree.near[closest].squared == 0.0:
         return False
-    if distance > options.step:
-        x = min(max(ox + (x - ox) * (options.step / distance), options.x0), options.x1)
-        y = min(max(oy + (y - oy) * (options.step / distance), options.y0), options.y1)
+    origin = tree.near[closest].vertex
     tree.counters[CHECKED] += 1
-    if not segment_is_free(space, ox, oy, x, y):
+    if not segment_is_free(space, tree.places[origin, X], tree.places[origin, Y], x, y):
         return False
     place(surface, tree, new, x, y)
-    count = find_near(tree, new, near_radius(tree, options, new), origin)
+    promising = measure_chords(tree, new, count)
+    tree.near[closest].free = 1
     tree.counters[CONSIDERED] += 2 * count - 1
-    if not choose_parent(surface, space, tree, options, new, count):
+    if not choose_parent(surface, space, tree, options, new, count, promising):
         return False
     rewire(surface, space, tree, options, new, count)
-    put(tree.buckets, tree.vertices, new)
+    put(tree.buckets, tree.places, new)
     tree.counters[VERTICES] = new + 1
     return True
 

@@ -2,16 +2,17 @@
 
 import math
 
+from .buckets import squared_distance
 from .compiler import inner_kernel, kernel
 from .surfaces import value_at
-from .tree import GOAL
+from .tree import COST, GOAL, LIFTED, X, Y
 
 
 @inner_kernel
 def distance_to_goal(tree, options, vertex):
     """Planar distance."""
     return math.hypot(
-        tree.vertices[vertex].x - options.goal_x, tree.vertices[vertex].y - options.goal_y
+        tree.places[vertex, X] - options.goal_x, tree.places[vertex, Y] - options.goal_y
     )
 
 
@@ -24,7 +25,7 @@ def area_to_search(tree, options):
     """
     area = (options.x1 - options.x0) * (options.y1 - options.y0)
     if options.informed and tree.counters[GOAL] >= 0:
-        longest = tree.vertices[tree.counters[GOAL]].cost / tree.floor
+        longest = tree.places[tree.counters[GOAL], COST] / tree.floor
         focal = distance_to_goal(tree, options, 0)
         area = min(area, 0.25 * math.pi * longest * math.sqrt(max(longest**2 - focal**2, 0.0)))
     return area
@@ -34,24 +35,23 @@ def area_to_search(tree, options):
 def can_improve(surface, tree, x, y):
     """Could a path through (x, y) beat the best one? By the chord bound, in R^n."""
     goal = tree.counters[GOAL]
-    a, b = tree.vertices[0], tree.vertices[goal]
-    from_start = (x - a.x) * (x - a.x) + (y - a.y) * (y - a.y)
-    to_goal = (x - b.x) * (x - b.x) + (y - b.y) * (y - b.y)
-    longest = b.cost / tree.floor
+    from_start = squared_distance(tree.places, 0, x, y)
+    to_goal = squared_distance(tree.places, goal, x, y)
+    longest = tree.places[goal, COST] / tree.floor
     if math.sqrt(from_start) + math.sqrt(to_goal) >= longest:
         return False
-    for layer in range(tree.lifted.shape[1]):
+    for layer in range(surface.weights.shape[0]):
         z = surface.weights[layer] * value_at(surface, layer, x, y)
-        from_start += (z - tree.lifted[0, layer]) ** 2
-        to_goal += (z - tree.lifted[goal, layer]) ** 2
+        from_start += (z - tree.places[0, LIFTED + layer]) ** 2
+        to_goal += (z - tree.places[goal, LIFTED + layer]) ** 2
     return math.sqrt(from_start) + math.sqrt(to_goal) < longest
 
 
 @inner_kernel
 def point_of_ellipse(tree, options, u, v):
     """The point of the ellipse of better paths for (u, v) in the unit square, uniformly."""
-    longest = tree.vertices[tree.counters[GOAL]].cost / tree.floor
-    ax, ay = tree.vertices[0].x, tree.vertices[0].y
+    longest = tree.places[tree.counters[GOAL], COST] / tree.floor
+    ax, ay = tree.places[0, X], tree.places[0, Y]
     focal = distance_to_goal(tree, options, 0)
     width = math.sqrt(max(longest**2 - focal**2, 0.0))
     along = 0.5 * longest * math.sqrt(u) * math.cos(2.0 * math.pi * v)

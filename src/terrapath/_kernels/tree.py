@@ -7,7 +7,8 @@ import numpy as np
 
 from .buckets import Buckets
 from .compiler import inner_kernel, kernel
-from .surfaces import metric_at, value_at
+from .lengths import composite_boole
+from .surfaces import Metric, metric_at, value_at
 
 # Places in Tree.counters.
 VERTICES = 0  # vertices in the tree
@@ -22,26 +23,29 @@ LAID_OUT = 8  # vertices when the buckets were last laid out
 COUNTERS = 9
 
 
-# A vertex: all that its neighbours read of it lies in one or two cache lines.
+# Entries of a row of Tree.places: all that the search for neighbours reads of a vertex.
+X, Y = 0, 1
+COST = 2  # length from the start
+LIFTED = 3  # the first of the weighted layer values
+
+# A vertex: what is read of it where an edge is measured, or changed.
 VERTEX = np.dtype(
     [
-        ("x", np.float64),
-        ("y", np.float64),
         ("h11", np.float64),  # the metric at the vertex
         ("h12", np.float64),
         ("h22", np.float64),
-        ("cost", np.float64),  # length from the start
         ("edge", np.float64),  # length of the edge from the parent
         ("parent", np.int32),  # -1 at the start
         ("child", np.int32),  # first child, -1 where none
         ("sibling", np.int32),  # next child of the same parent
-        ("next", np.int32),  # next vertex of the same bucket
+        ("age", np.int32),  # how many vertices there were before it
     ]
 )
 
 # A candidate edge between the newest vertex and one near it.
 CANDIDATE = np.dtype(
     [
+        ("squared", np.float64),  # planar distance squared
         ("chord", np.float64),
         ("cost", np.float64),  # of the other vertex, before this extension
         ("length", np.float64),  # negative where not yet measured
@@ -52,10 +56,13 @@ CANDIDATE = np.dtype(
 
 
 class Tree(NamedTuple):
-    """The tree and its workspace; all arrays are filled in place."""
+    """The tree and its workspace; all arrays are filled in place.
 
+    Vertices are numbered anew each time the buckets are laid out, but the start is always 0.
+    """
+
+    places: np.ndarray  # (n, LIFTED + layers) float64: rows of X, Y, COST and LIFTED
     vertices: np.ndarray  # (n,) VERTEX
-    lifted: np.ndarray  # (n, layers) float64: weighted layer values
     counters: np.ndarray  # (COUNTERS,) int64
     buckets: Buckets
     floor: float  # no cost of the surface is below it
@@ -82,25 +89,30 @@ class Options(NamedTuple):
 
 
 @inner_kernel
-def chord_between(tree, a, b):
-    """Chord between two vertices, times the least cost."""
-    dx = tree.vertices[a].x - tree.vertices[b].x
-    dy = tree.vertices[a].y - tree.vertices[b].y
-    total = dx * dx + dy * dy
-    for layer in range(tree.lifted.shape[1]):
-        rise = tree.lifted[a, layer] - tree.lifted[b, layer]
+def chord_between(graph, a, b):
+    """Chord between two vertices of any graph with ``places``, times the least cost."""
+    p, q = graph.places[a], graph.places[b]
+    dx, dy = p[X] - q[X], p[Y] - q[Y]
+    return graph.floor * math.sqrt(dx * dx + dy * dy + squared_rise(graph, a, b))
+
+
+@inner_kernel
+def squared_rise(graph, a, b):
+    """How far the layers rise between two vertices, squared and summed."""
+    total = 0.0
+    for entry in range(LIFTED, graph.places.shape[1]):
+        rise = graph.places[a, entry] - graph.places[b, entry]
         total += rise * rise
-    return tree.floor * math.sqrt(total)
+    return total
 
 
 @inner_kernel
 def survey(surface, graph, new, x, y):
-    """Write a vertex's position and the surface above it; any graph's with ``lifted`` layers."""
-    vertex = graph.vertices[new]
-    vertex.x = x
-    vertex.y = y
-    for layer in range(graph.lifted.shape[1]):
-        graph.lifted[new, layer] = surface.weights[layer] * value_at(surface, layer, x, y)
+    """Write a vertex's position and the surface above it; any graph's with ``places``."""
+    place, vertex = graph.places[new], graph.vertices[new]
+    place[X], place[Y] = x, y
+    for layer in range(surface.weights.shape[0]):
+        place[LIFTED + layer] = surface.weights[layer] * value_at(surface, layer, x, y)
     h = metric_at(surface, x, y)
     vertex.h11 = h.h11
     vertex.h12 = h.h12
@@ -108,18 +120,28 @@ def survey(surface, graph, new, x, y):
 
 
 @kernel
+def edge_length(surface, graph, a, b, panel):
+    """Length of the edge between two vertices by Line-R, in panels."""
+    p, q, v, w = graph.places[a], graph.places[b], graph.vertices[a], graph.vertices[b]
+    hp, hq = Metric(v.h11, v.h12, v.h22), Metric(w.h11, w.h12, w.h22)
+    panels = max(math.ceil(math.hypot(q[X] - p[X], q[Y] - p[Y]) / panel), 1)
+    return composite_boole(surface, p[X], p[Y], hp, q[X], q[Y], hq, panels)
+
+
+@kernel
 def place(surface, tree, new, x, y):
     """Write a vertex's position and what is cached with it; it is not yet in the tree."""
     survey(surface, tree, new, x, y)
     tree.vertices[new].child = -1
+    tree.vertices[new].age = new
 
 
 @kernel
 def plant(surface, tree, options, x, y):
     """Start the tree with one vertex."""
     place(surface, tree, 0, x, y)
+    tree.places[0, COST] = 0.0
     root = tree.vertices[0]
-    root.cost = 0.0
     root.edge = 0.0
     root.parent = -1
     root.sibling = -1
@@ -131,14 +153,14 @@ def plant(surface, tree, options, x, y):
 
 
 @kernel
-def adopt(vertices, parent, child, edge):
+def adopt(tree, parent, child, edge):
     """Hang a vertex below a parent."""
-    vertex = vertices[child]
+    vertex = tree.vertices[child]
     vertex.parent = parent
     vertex.edge = edge
-    vertex.cost = vertices[parent].cost + edge
-    vertex.sibling = vertices[parent].child
-    vertices[parent].child = child
+    vertex.sibling = tree.vertices[parent].child
+    tree.vertices[parent].child = child
+    tree.places[child, COST] = tree.places[parent, COST] + edge
 
 
 @kernel
@@ -155,16 +177,54 @@ def release(vertices, child):
 
 
 @kernel
-def pass_on_cost(vertices, stack, root):
+def pass_on_cost(tree, root):
     """Recompute the cost of everything below a vertex."""
-    stack[0] = root
+    tree.stack[0] = root
     count = 1
     while count > 0:
         count -= 1
-        cost = vertices[stack[count]].cost
-        child = vertices[stack[count]].child
+        parent = tree.stack[count]
+        cost = tree.places[parent, COST]
+        child = tree.vertices[parent].child
         while child >= 0:
-            vertices[child].cost = cost + vertices[child].edge
-            stack[count] = child
+            tree.places[child, COST] = cost + tree.vertices[child].edge
+            tree.stack[count] = child
             count += 1
-            child = vertices[child].sibling
+            child = tree.vertices[child].sibling
+
+
+# Vertices that lie near one another are looked at together. In the order in which they came
+# they would be strewn over the memory, and most of the time would go by waiting for them.
+
+
+@inner_kernel
+def renamed(numbers, vertex):
+    return numbers[vertex] if vertex >= 0 else vertex
+
+
+@inner_kernel
+def swap(tree, p, q, spare):
+    """Swap two vertices, by way of a spare one."""
+    tree.vertices[spare] = tree.vertices[p]
+    tree.vertices[p] = tree.vertices[q]
+    tree.vertices[q] = tree.vertices[spare]
+    for entry in range(tree.places.shape[1]):
+        number = tree.places[p, entry]
+        tree.places[p, entry] = tree.places[q, entry]
+        tree.places[q, entry] = number
+
+
+@kernel
+def renumber(tree, count, numbers):
+    """Give each of the first vertices its number in ``numbers`` (count,), which is used up."""
+    for p in range(count):
+        vertex = tree.vertices[p]
+        vertex.parent = renamed(numbers, vertex.parent)
+        vertex.child = renamed(numbers, vertex.child)
+        vertex.sibling = renamed(numbers, vertex.sibling)
+    tree.counters[GOAL] = renamed(numbers, tree.counters[GOAL])
+    for p in range(count):
+        while numbers[p] != p:
+            q = numbers[p]
+            swap(tree, p, q, count)
+            numbers[p], numbers[q] = numbers[q], q

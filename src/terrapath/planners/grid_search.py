@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels import grid_search as kernels
+from .._kernels import tree as trees
 from ..errors import InputError
 from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
@@ -135,7 +136,7 @@ class _Search:
 
     @property
     def best_cost(self) -> float:
-        return float(self.graph.vertices[self.goal]["cost"])
+        return float(self.graph.places[self.goal, trees.COST])
 
     @property
     def settled(self) -> int:
@@ -177,7 +178,7 @@ def _allocate(lattice: Lattice, surface: Surface) -> kernels.Graph:
     try:
         return kernels.Graph(
             vertices=np.zeros(size, kernels.VERTEX).view(np.recarray),
-            lifted=np.empty((size, len(surface.layers))),
+            places=np.empty((size, trees.LIFTED + len(surface.layers))),
             heap=np.empty(size + 1, kernels.ENTRY).view(np.recarray),
             counters=np.zeros(kernels.COUNTERS, np.int64),
             floor=surface.least_cost,
@@ -250,7 +251,7 @@ def _path(search: _Search) -> Path | None:
     way = [search.goal]
     while (parent := int(vertices[way[-1]]["parent"])) >= 0:
         way.append(parent)
-    points = np.column_stack([vertices["x"][way[::-1]], vertices["y"][way[::-1]]])
+    points = search.graph.places[way[::-1], : trees.COST]
     # A start or goal that lies on a node is a vertex twice.
     points = points[np.append((points[1:] != points[:-1]).any(axis=1), True)]
     bends = points[_are_bends(points)]

@@ -71,11 +71,18 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
 
 def _allocate(samples: int, surface: Surface) -> trees.Tree:
     size = samples + 2  # the start, and the goal that may join with the last sample
+    room = size // 2 + 64  # for buckets
     return trees.Tree(
+        places=np.empty((size, trees.LIFTED + len(surface.layers))),
         vertices=np.empty(size, trees.VERTEX).view(np.recarray),
-        lifted=np.empty((size, len(surface.layers))),
         counters=np.zeros(trees.COUNTERS, np.int64),
-        buckets=Buckets(np.empty(size // 2 + 64, np.int32), np.zeros(3), np.zeros(2, np.int64)),
+        buckets=Buckets(
+            first=np.empty(room + 1, np.int32),
+            head=np.empty(room, np.int32),
+            next=np.empty(size, np.int32),
+            frame=np.zeros(3),
+            shape=np.zeros(2, np.int64),
+        ),
         floor=surface.least_cost,
         near=np.empty(size, trees.CANDIDATE).view(np.recarray),
         stack=np.empty(size, np.int32),
@@ -103,7 +110,7 @@ class _Search:
 
     @property
     def best_cost(self) -> float:
-        return float(self.tree.vertices[self.goal]["cost"]) if self.goal >= 0 else math.inf
+        return float(self.tree.places[self.goal, trees.COST]) if self.goal >= 0 else math.inf
 
     @property
     def samples(self) -> int:
@@ -165,18 +172,23 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
     vertex = int(tree.counters[trees.GOAL])
     if vertex < 0:
         return None
-    points = []
+    way = []
     while vertex >= 0:
-        row = tree.vertices[vertex]
-        points.append((row["x"], row["y"]))
-        vertex = int(row["parent"])
-    return problem.path(points[::-1])
+        way.append(vertex)
+        vertex = int(tree.vertices[vertex]["parent"])
+    return problem.path(tree.places[way[::-1], : trees.COST])
 
 
 def _search_tree(tree: trees.Tree) -> SearchTree:
-    rows = tree.vertices[: tree.counters[trees.VERTICES]]
-    points = np.column_stack([rows["x"], rows["y"]])
-    return SearchTree(points, rows["parent"].copy(), rows["cost"].copy())
+    """The vertices in the order in which they came."""
+    vertices = tree.vertices[: tree.counters[trees.VERTICES]]
+    by_age = np.argsort(vertices["age"])
+    ages = np.append(vertices["age"], np.int32(-1))  # what the start's parent, -1, stands for
+    return SearchTree(
+        points=tree.places[by_age, : trees.COST],
+        parents=ages[vertices["parent"][by_age]],
+        costs=tree.places[by_age, trees.COST],
+    )
 
 
 def _counters(tree: trees.Tree) -> dict[str, int]:
