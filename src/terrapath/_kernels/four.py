@@ -86,8 +86,6 @@ for _operator, _instruction in {
     operator.add: "fadd",
     operator.sub: "fsub",
     operator.mul: "fmul",
-    operator.iadd: "fadd",
-    operator.isub: "fsub",
 }.items():
     _lowered_by(_arithmetic(_instruction), _all_four, FourType, FourType)(_operator)
 

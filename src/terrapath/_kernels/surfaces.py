@@ -95,7 +95,8 @@ def peaks_jet(surface, layer, x, y):
 
 @inner_kernel
 def peaks_metric(surface, x, y):
-    none = 0.0 * x
+    """H at a point, or at four."""
+    none = 0.0 * x  # a number or four
     h11, h12, h22 = none + 1.0, none, none + 1.0
     for layer in range(surface.weights.shape[0]):
         fx, fy = none, none
@@ -104,12 +105,13 @@ def peaks_metric(surface, x, y):
             dy = y - surface.peaks[p, 3]
             falloff = surface.peaks[p, 1]
             g = surface.peaks[p, 0] * falloff * exp(-falloff * (dx * dx + dy * dy))
-            fx -= dx * g
-            fy -= dy * g
+            # Not in place: in plain Python that would change ``none``.
+            fx = fx - dx * g
+            fy = fy - dy * g
         w = 4.0 * surface.weights[layer] * surface.weights[layer]
-        h11 += w * fx * fx
-        h12 += w * fx * fy
-        h22 += w * fy * fy
+        h11 = h11 + w * fx * fx
+        h12 = h12 + w * fx * fy
+        h22 = h22 + w * fy * fy
     return Metric(h11, h12, h22)
 
 
