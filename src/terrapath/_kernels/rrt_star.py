@@ -27,6 +27,7 @@ from .tree import (
     X,
     Y,
     adopt,
+    chord_between,
     edge_length,
     pass_on_cost,
     place,
@@ -209,6 +210,21 @@ def refresh_buckets(tree, options, radius):
 
 
 @kernel
+def cannot_improve(tree, options, new, promising):
+    """Is the best path, as far as there is one, as short as any through the new vertex can be?
+
+    None through it is shorter than the way to it, by the most promising candidate, and the
+    chord to the goal. What is turned away for costs that will fall later is drawn again, as
+    on the best way costs fall from the start onwards.
+    """
+    goal = tree.counters[GOAL]
+    if goal < 0 or not options.informed:
+        return False
+    come = tree.near[promising].cost + tree.near[promising].chord
+    return come + chord_between(tree, new, goal) >= tree.places[goal, COST]
+
+
+@kernel
 def extend(surface, space, tree, options, x, y):
     """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew."""
     new = tree.counters[VERTICES]
@@ -217,13 +233,12 @@ def extend(surface, space, tree, options, x, y):
     x, y, count, closest = find_near(tree, options, radius, x, y)
     if tree.near[closest].squared == 0.0:
         return False
-    origin = tree.near[closest].vertex
-    tree.counters[CHECKED] += 1
-    if not segment_is_free(space, tree.places[origin, X], tree.places[origin, Y], x, y):
-        return False
     place(surface, tree, new, x, y)
     promising = measure_chords(tree, new, count)
-    tree.near[closest].free = 1
+    if promising < 0 or cannot_improve(tree, options, new, promising):
+        return False
+    if not candidate_is_free(space, tree, new, closest):
+        return False
     tree.counters[CONSIDERED] += 2 * count - 1
     if not choose_parent(surface, space, tree, options, new, count, promising):
         return False

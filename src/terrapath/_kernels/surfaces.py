@@ -46,12 +46,27 @@ class Jet(NamedTuple):
     fyy: float
 
 
+class Slope(NamedTuple):
+    """Value and gradient of one layer at a point."""
+
+    f: float
+    fx: float
+    fy: float
+
+
 class Metric(NamedTuple):
     """The symmetric tensor h at a point (paper, section 3.2)."""
 
     h11: float
     h12: float
     h22: float
+
+
+class Point(NamedTuple):
+    """A point, or four, over peaks."""
+
+    x: float
+    y: float
 
 
 class Cell(NamedTuple):
@@ -63,17 +78,38 @@ class Cell(NamedTuple):
     v: float
 
 
+class Spot(NamedTuple):
+    """A point over a spline: its cell, and what all layers weight their coefficients with."""
+
+    cell: Cell
+    bx: np.ndarray  # four, as the others: B-splines along x1
+    by: np.ndarray
+    sx: np.ndarray  # their slopes, by map units
+    sy: np.ndarray
+
+
 # Peaks
 
 
 @inner_kernel
-def peaks_value(surface, layer, x, y):
-    total = 0.0
+def peaks_spot(surface, x, y):
+    return Point(x, y)
+
+
+@inner_kernel
+def peaks_slope(surface, layer, spot):
+    f = 0.0 * spot.x  # a number or four
+    fx, fy = f, f
     for p in range(surface.first[layer], surface.first[layer + 1]):
-        dx = x - surface.peaks[p, 2]
-        dy = y - surface.peaks[p, 3]
-        total += surface.peaks[p, 0] * exp(-surface.peaks[p, 1] * (dx * dx + dy * dy))
-    return total
+        dx = spot.x - surface.peaks[p, 2]
+        dy = spot.y - surface.peaks[p, 3]
+        falloff = surface.peaks[p, 1]
+        g = surface.peaks[p, 0] * exp(-falloff * (dx * dx + dy * dy))
+        # Not in place: in plain Python that would change all three.
+        f = f + g
+        fx = fx - 2.0 * falloff * dx * g
+        fy = fy - 2.0 * falloff * dy * g
+    return Slope(f, fx, fy)
 
 
 @kernel
@@ -91,28 +127,6 @@ def peaks_jet(surface, layer, x, y):
         fxy += c * c * dx * dy * g
         fyy += (c + c * c * dy * dy) * g
     return Jet(f, fx, fy, fxx, fxy, fyy)
-
-
-@inner_kernel
-def peaks_metric(surface, x, y):
-    """H at a point, or at four."""
-    none = 0.0 * x  # a number or four
-    h11, h12, h22 = none + 1.0, none, none + 1.0
-    for layer in range(surface.weights.shape[0]):
-        fx, fy = none, none
-        for p in range(surface.first[layer], surface.first[layer + 1]):
-            dx = x - surface.peaks[p, 2]
-            dy = y - surface.peaks[p, 3]
-            falloff = surface.peaks[p, 1]
-            g = surface.peaks[p, 0] * falloff * exp(-falloff * (dx * dx + dy * dy))
-            # Not in place: in plain Python that would change ``none``.
-            fx = fx - dx * g
-            fy = fy - dy * g
-        w = 4.0 * surface.weights[layer] * surface.weights[layer]
-        h11 = h11 + w * fx * fx
-        h12 = h12 + w * fx * fy
-        h22 = h22 + w * fy * fy
-    return Metric(h11, h12, h22)
 
 
 # Spline
@@ -170,9 +184,18 @@ def tensor_sum(coefficients, layer, cell, bx, by):
 
 
 @inner_kernel
-def spline_value(surface, layer, x, y):
+def spline_spot(surface, x, y):
     cell = spline_cell(surface, x, y)
-    return tensor_sum(surface.coefficients, layer, cell, basis(cell.u), basis(cell.v))
+    per_x, per_y = 1.0 / surface.dx, 1.0 / surface.dy
+    sx, sy = per_x * basis_slope(cell.u), per_y * basis_slope(cell.v)
+    return Spot(cell, basis(cell.u), basis(cell.v), sx, sy)
+
+
+@inner_kernel
+def spline_slope(surface, layer, spot):
+    sums = column_sums(surface.coefficients, layer, spot.cell, spot.by)
+    rises = column_sums(surface.coefficients, layer, spot.cell, spot.sy)
+    return Slope(total(spot.bx * sums), total(spot.sx * sums), total(spot.bx * rises))
 
 
 @inner_kernel
@@ -197,41 +220,15 @@ def jet_of_coefficients(surface, c, layer, x, y):
 
 
 @inner_kernel
-def spline_metric(surface, x, y):
-    cell = spline_cell(surface, x, y)
-    bx, by = basis(cell.u), basis(cell.v)
-    sx, sy = basis_slope(cell.u), basis_slope(cell.v)
-    per_x, per_y = 1.0 / surface.dx, 1.0 / surface.dy
-    h11, h12, h22 = 1.0, 0.0, 1.0
-    for layer in range(surface.weights.shape[0]):
-        w = surface.weights[layer]
-        fx = w * per_x * tensor_sum(surface.coefficients, layer, cell, sx, by)
-        fy = w * per_y * tensor_sum(surface.coefficients, layer, cell, bx, sy)
-        h11 += fx * fx
-        h12 += fx * fy
-        h22 += fy * fy
-    if surface.log_cost.shape[0] > 0:
-        c2 = exp(2.0 * tensor_sum(surface.log_cost, 0, cell, bx, by))
-        return Metric(c2 * h11, c2 * h12, c2 * h22)
-    return Metric(h11, h12, h22)
+def peaks_squared_cost(surface, spot):
+    return 1.0
 
 
 @inner_kernel
-def peaks_metric_inside(surface, x, y, dx, dy):
-    quarters = four(0.25, 0.5, 0.75, 1.0)
-    return peaks_metric(surface, fused(quarters, dx, x), fused(quarters, dy, y))
-
-
-@inner_kernel
-def spline_metric_inside(surface, x, y, dx, dy):
-    a = spline_metric(surface, x + 0.25 * dx, y + 0.25 * dy)
-    b = spline_metric(surface, x + 0.5 * dx, y + 0.5 * dy)
-    c = spline_metric(surface, x + 0.75 * dx, y + 0.75 * dy)
-    return Metric(
-        four(a.h11, b.h11, c.h11, c.h11),
-        four(a.h12, b.h12, c.h12, c.h12),
-        four(a.h22, b.h22, c.h22, c.h22),
-    )
+def spline_squared_cost(surface, spot):
+    if surface.log_cost.shape[0] == 0:
+        return 1.0
+    return exp(2.0 * tensor_sum(surface.log_cost, 0, spot.cell, spot.bx, spot.by))
 
 
 @inner_kernel
@@ -259,9 +256,14 @@ def spline_floor(surface):
 # Either class
 
 
-@per_class({Peaks: peaks_value, Spline: spline_value})
-def value_at(surface, layer, x, y):
-    """Value of one layer, in the layer's unit."""
+@per_class({Peaks: peaks_spot, Spline: spline_spot})
+def spot_at(surface, x, y):
+    """What all layers share at a point; on ``Peaks`` at four of them, too."""
+
+
+@per_class({Peaks: peaks_slope, Spline: spline_slope})
+def slope_at(surface, layer, spot):
+    """Value and gradient of one layer (unweighted)."""
 
 
 @per_class({Peaks: peaks_jet, Spline: spline_jet})
@@ -269,17 +271,9 @@ def jet_at(surface, layer, x, y):
     """Value, gradient and Hessian of one layer (unweighted)."""
 
 
-@per_class({Peaks: peaks_metric, Spline: spline_metric})
-def metric_at(surface, x, y):
-    """H = c^2 (I + sum_k w_k^2 grad x_k grad x_k^T) (paper, section 3.2; c is 1 there)."""
-
-
-@per_class({Peaks: peaks_metric_inside, Spline: spline_metric_inside})
-def metric_inside(surface, x, y, dx, dy):
-    """H at a quarter, a half and three quarters of the way from (x, y) on by (dx, dy), as fours.
-
-    What the last of four is does not matter.
-    """
+@per_class({Peaks: peaks_squared_cost, Spline: spline_squared_cost})
+def squared_cost_at(surface, spot):
+    """c^2; 1 without a cost."""
 
 
 @per_class({Peaks: peaks_log_cost, Spline: spline_log_cost})
@@ -290,6 +284,63 @@ def log_cost_at(surface, x, y):
 @per_class({Peaks: peaks_floor, Spline: spline_floor})
 def floor_of(surface):
     """A number that c is nowhere below."""
+
+
+@inner_kernel
+def value_at(surface, layer, x, y):
+    """Value of one layer, in the layer's unit."""
+    return slope_at(surface, layer, spot_at(surface, x, y)).f
+
+
+@inner_kernel
+def plus_layer(h, weight, slope):
+    """The metric with one layer more."""
+    fx, fy = weight * slope.fx, weight * slope.fy
+    return Metric(h.h11 + fx * fx, h.h12 + fx * fy, h.h22 + fy * fy)
+
+
+@inner_kernel
+def times_cost(surface, spot, h):
+    """The metric times c^2."""
+    c2 = squared_cost_at(surface, spot)
+    return Metric(c2 * h.h11, c2 * h.h12, c2 * h.h22)
+
+
+@inner_kernel
+def metric_at(surface, x, y):
+    """H = c^2 (I + sum_k w_k^2 grad x_k grad x_k^T) (paper, section 3.2; c is 1 there)."""
+    spot = spot_at(surface, x, y)
+    none = 0.0 * x  # a number or four
+    h = Metric(none + 1.0, none, none + 1.0)
+    for layer in range(surface.weights.shape[0]):
+        h = plus_layer(h, surface.weights[layer], slope_at(surface, layer, spot))
+    return times_cost(surface, spot, h)
+
+
+@inner_kernel
+def peaks_metric_inside(surface, x, y, dx, dy):
+    quarters = four(0.25, 0.5, 0.75, 1.0)
+    return metric_at(surface, fused(quarters, dx, x), fused(quarters, dy, y))
+
+
+@inner_kernel
+def spline_metric_inside(surface, x, y, dx, dy):
+    a = metric_at(surface, x + 0.25 * dx, y + 0.25 * dy)
+    b = metric_at(surface, x + 0.5 * dx, y + 0.5 * dy)
+    c = metric_at(surface, x + 0.75 * dx, y + 0.75 * dy)
+    return Metric(
+        four(a.h11, b.h11, c.h11, c.h11),
+        four(a.h12, b.h12, c.h12, c.h12),
+        four(a.h22, b.h22, c.h22, c.h22),
+    )
+
+
+@per_class({Peaks: peaks_metric_inside, Spline: spline_metric_inside})
+def metric_inside(surface, x, y, dx, dy):
+    """H at a quarter, a half and three quarters of the way from (x, y) on by (dx, dy), as fours.
+
+    What the last of four is does not matter.
+    """
 
 
 # Many points at once: points (m, 2); results are filled in

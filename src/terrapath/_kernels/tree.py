@@ -8,7 +8,7 @@ import numpy as np
 from .buckets import Buckets
 from .compiler import inner_kernel, kernel
 from .lengths import composite_boole
-from .surfaces import Metric, metric_at, value_at
+from .surfaces import Metric, plus_layer, slope_at, spot_at, times_cost
 
 # Places in Tree.counters.
 VERTICES = 0  # vertices in the tree
@@ -111,9 +111,12 @@ def survey(surface, graph, new, x, y):
     """Write a vertex's position and the surface above it; any graph's with ``places``."""
     place, vertex = graph.places[new], graph.vertices[new]
     place[X], place[Y] = x, y
+    spot, h = spot_at(surface, x, y), Metric(1.0, 0.0, 1.0)
     for layer in range(surface.weights.shape[0]):
-        place[LIFTED + layer] = surface.weights[layer] * value_at(surface, layer, x, y)
-    h = metric_at(surface, x, y)
+        slope = slope_at(surface, layer, spot)
+        place[LIFTED + layer] = surface.weights[layer] * slope.f
+        h = plus_layer(h, surface.weights[layer], slope)
+    h = times_cost(surface, spot, h)
     vertex.h11 = h.h11
     vertex.h12 = h.h12
     vertex.h22 = h.h22
@@ -124,7 +127,8 @@ def edge_length(surface, graph, a, b, panel):
     """Length of the edge between two vertices by Line-R, in panels."""
     p, q, v, w = graph.places[a], graph.places[b], graph.vertices[a], graph.vertices[b]
     hp, hq = Metric(v.h11, v.h12, v.h22), Metric(w.h11, w.h12, w.h22)
-    panels = max(math.ceil(math.hypot(q[X] - p[X], q[Y] - p[Y]) / panel), 1)
+    dx, dy = q[X] - p[X], q[Y] - p[Y]
+    panels = max(math.ceil(math.sqrt(dx * dx + dy * dy) / panel), 1)
     return composite_boole(surface, p[X], p[Y], hp, q[X], q[Y], hq, panels)
 
 
