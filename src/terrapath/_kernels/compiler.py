@@ -105,6 +105,10 @@ class _Library(JITCodeLibrary):
         if isinstance(library, _PartLibrary):
             self._linking_libraries.extend(library._linking_libraries)
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Only what is needed to link: all is optimised at once, later."""
+        ll_module.data_layout = self._codegen._data_layout
+
 
 class _KernelLibrary(_Library):
     """Machine code, for Python."""
@@ -129,10 +133,6 @@ class _KernelLibrary(_Library):
 
 class _PartLibrary(_Library):
     """Intermediate code alone: it is linked and optimised where a kernel calls it."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        """Only what is needed to link: all is optimised later."""
-        ll_module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
         self._raise_if_finalized()
