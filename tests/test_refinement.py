@@ -10,7 +10,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 import planner_oracles
 import terrapath as tp
@@ -24,6 +24,7 @@ from oracles import (
 from terrapath import metric, scenes
 from terrapath._kernels import refinement as kernels
 from terrapath.refinement import newton
+from terrapath.refinement.curve import spline_through
 
 FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
 REGION = (-1.0, -1.0, 11.0, 11.0)
@@ -620,3 +621,22 @@ def test_a_moving_segment_meets_a_corner_when_it_comes_to_lie_on_it(seed):
         if side(low) * side(high) < 0.0 and distance(0.5 * (low + high)) < 1e-4
     ]
     assert not crossed
+
+
+# Curves through points
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 6, 7, 8, 13, 200])
+def test_a_curve_is_the_spline_that_scipy_makes(count, degree):
+    points = np.random.default_rng(count).normal(size=(count, 2)).cumsum(axis=0)
+    degree_left = min(degree, count - 1)
+    oracle = make_interp_spline(np.linspace(0.0, 1.0, count), points, k=degree_left)
+    curve = spline_through(points, degree)
+    places = np.linspace(0.0, 1.0, 5 * count)
+    for derivative in range(min(degree_left, 2) + 1):
+        wanted = oracle(places, derivative)
+        np.testing.assert_allclose(
+            curve(places, derivative), wanted, rtol=0.0, atol=1e-12 * np.abs(wanted).max()
+        )
+    assert curve.degree == degree_left

@@ -1,7 +1,9 @@
 """The first run: what is compiled, what is said of it, and `terrapath warmup`."""
 
+import json
 import logging
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -102,6 +104,31 @@ def test_a_kernel_that_kernels_call_is_compiled_by_itself_only_for_python(call):
     assert files == 4  # an index and machine code of each
     first, second, told_first, told, parts, files = call()
     assert (first, second, told, parts, files) == (11.0, 4.0, [], 0, 4)
+
+
+ALLOCATING = (
+    "import numpy as np\nfrom .compiler import allocating_kernel, kernel\n\n"
+    "@allocating_kernel\ndef summed(n):\n    return np.ones(n).sum()\n\n"
+    "@kernel\ndef doubled(n):\n    return 2.0 * summed(n)\n"
+)
+
+
+def test_a_kernel_is_loaded_without_what_compiles_it(call, tmp_path):
+    call()
+    (tmp_path / "copied" / "allocating.py").write_text(ALLOCATING)
+    code = (
+        f"import json, sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "from copied.allocating import doubled\n"
+        "from copied.compiler import cache_statistics\n"
+        "print(json.dumps([doubled(3), cache_statistics(), sorted(sys.modules)]))"
+    )
+    found = [in_another_process(code, NUMBA_CACHE_DIR=str(tmp_path / "cache")) for _ in range(2)]
+    values, statistics, modules = zip(*found, strict=True)
+    assert values == (6.0, 6.0)
+    assert [done["loaded"] for done in statistics] == [0, 1]
+    compiling = {"numba.np.arraymath", "numba.np.linalg", "scipy.linalg"}
+    assert compiling <= set(modules[0])
+    assert not compiling & set(modules[1])
 
 
 def test_processes_that_compile_at_once_do_not_write_to_the_same_file(tmp_path):
@@ -218,16 +245,38 @@ def test_both_classes_of_surface_are_rehearsed_by_every_kind_of_work():
     assert len(warmup.rehearsals()) == len(warmup.KINDS) * len(warmup.SURFACES)
 
 
-def test_help_imports_nothing_heavy():
-    code = (
-        "import json, sys; from terrapath.cli.main import run; run(['--help'])\n"
-        "sys.stdout.write('\\n'); print(json.dumps(sorted(sys.modules)))"
-    )
-    import json
-    import subprocess
+# What is imported
 
+
+def modules_of(*arguments):
+    """What a run of the command has imported: packages, and the parts of SciPy."""
+    code = (
+        f"import sys; from terrapath.cli.main import run; run({list(arguments)})\n"
+        "import json; sys.stdout.write('\\n'); print(json.dumps(sorted(sys.modules)))"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path.cwd()
     )
-    modules = set(json.loads(done.stdout.splitlines()[-1]))
-    assert not modules & {"numpy", "numba", "scipy", "pydantic", "matplotlib", "rasterio", "rich"}
+    modules = json.loads(done.stdout.splitlines()[-1])
+    parts = {".".join(name.split(".")[:2]) for name in modules if name.startswith("scipy.")}
+    return {name.split(".")[0] for name in modules} | parts
+
+
+FOR_SOME = {
+    "geopandas", "gpxpy", "matplotlib", "pandas", "plotly", "pyogrio", "pyproj", "rasterio",
+    "rich", "sympy", "xarray",
+}  # fmt: skip
+
+
+def test_help_imports_nothing_heavy():
+    modules = modules_of("--help")
+    assert not modules & (FOR_SOME | {"numpy", "numba", "scipy", "shapely", "pydantic"})
+
+
+def test_a_plan_on_a_scene_imports_what_it_needs():
+    wanted = ("plan", "six-peaks", "--json", "--samples", "500")
+    modules_of(*wanted)  # compiles, which takes more
+    modules = modules_of(*wanted)
+    assert "numba" in modules
+    scipy = {"fft", "integrate", "interpolate", "linalg", "ndimage", "optimize", "sparse"}
+    assert not modules & (FOR_SOME | {f"scipy.{part}" for part in scipy})

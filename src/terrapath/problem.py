@@ -145,6 +145,21 @@ class Problem:
         return f"Problem({name}{start} to {goal} within {bounds}; {surface!r})"
 
 
+def _sampled(points: Array, finest: float) -> Array:
+    """A polyline (m, 2) with its pieces cut into equal ones that are no longer than ``finest``.
+
+    They stay as they are where that is 0.
+    """
+    moves = np.diff(points, axis=0)
+    sizes = np.hypot(*moves.T) / finest if finest > 0.0 else np.ones(len(moves))
+    counts = np.maximum(np.ceil(sizes), 1.0).astype(np.intp)
+    piece = np.repeat(np.arange(len(moves)), counts)
+    place = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
+    # The last place is the piece's end, whatever rounding makes of the share.
+    shares = np.where(place == counts[piece], 1.0, place * (1.0 / counts)[piece])
+    return np.concatenate([points[:1], points[piece] + shares[:, None] * moves[piece]])
+
+
 @dataclass(frozen=True, eq=False)
 class Path:
     """A polyline of the plane, read as a curve on the surface above it.
@@ -168,12 +183,8 @@ class Path:
     @cached_property
     def profile(self) -> Profile:
         """The path sampled finely enough to see every feature of the surface."""
-        pieces = [self.points[:1]]
         finest = min(0.25 * self.surface.resolution, self.line.length / PROFILE_POINTS)
-        for a, b in zip(self.points[:-1], self.points[1:], strict=True):
-            count = max(int(np.ceil(np.hypot(*(b - a)) / finest)), 1) if finest > 0.0 else 1
-            pieces.append(a + np.linspace(0.0, 1.0, count + 1)[1:, None] * (b - a))
-        points = np.concatenate(pieces)
+        points = _sampled(self.points, finest)
         steps = metric.segment_lengths(self.surface, points[:-1], points[1:])
         distance = np.concatenate([[0.0], np.cumsum(steps)])
         values, costs = self.surface.values(points), self.surface.cost_values(points)

@@ -12,12 +12,14 @@ from functools import cache, cached_property, wraps
 from pathlib import Path
 from typing import Any
 
+from llvmlite.binding import parse_assembly
 from numba import __version__ as numba_version
 from numba import config, njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
 Kernel = Callable[..., Any]
@@ -69,6 +71,14 @@ class _PackageCache:
         found._cache_file = _CacheFile(found.cache_path, found._impl.filename_base, _STAMP)
         return found
 
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Machine code from the disk, if it is there.
+
+        Numba first imports all that it can compile, and SciPy's linear algebra with it. That
+        takes as long as a plan, and what is compiled already needs none of it.
+        """
+        return self._cache._load_overload(signature, context)
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self._cache, name)
 
@@ -82,8 +92,12 @@ class _PackageCache:
 # LLVM's intermediate code. That is optimised once, in the machine code of who calls it.
 
 
+# How Numba's names of environments begin: what a function needs of the module it stands in.
+_ENVIRONMENT = "_ZN08NumbaEnv"
+
+
 class _Library(JITCodeLibrary):
-    """Machine code of a kernel, with the parts that it calls directly or through others."""
+    """What a kernel is compiled to, with the parts that it calls directly or through others."""
 
     def add_linking_library(self, library: Any) -> None:
         super().add_linking_library(library)
@@ -91,18 +105,34 @@ class _Library(JITCodeLibrary):
         if isinstance(library, _PartLibrary):
             self._linking_libraries.extend(library._linking_libraries)
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Only what is needed to link: all is optimised at once, later."""
+        ll_module.data_layout = self._codegen._data_layout
+
+
+class _KernelLibrary(_Library):
+    """Machine code, for Python."""
+
     def _optimize_final_module(self) -> None:
-        """All passes at once; Numba's own, cheap ones before them are for counted references."""
+        """All passes at once; Numba's own, cheap ones before them are for counted references.
+
+        Environments that nothing refers to may go, which are those of all parts: they are for
+        errors that kernels do not raise, and each is made anew where the kernel is loaded.
+        """
+        for variable in self._final_module.global_variables:
+            if variable.name.startswith(_ENVIRONMENT):
+                variable.linkage = "linkonce_odr"
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
+
+    def _get_module_for_linking(self) -> Any:
+        """What is kept beside the machine code: names alone, for callers link the part."""
+        names = [function.name for function in self.get_defined_functions()]
+        return parse_assembly("".join(f'define void @"{n}"() {{ ret void }}\n' for n in names))
 
 
 class _PartLibrary(_Library):
     """Intermediate code alone: it is linked and optimised where a kernel calls it."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        """Only what is needed to link: all is optimised later."""
-        ll_module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
         self._raise_if_finalized()
@@ -110,13 +140,28 @@ class _PartLibrary(_Library):
         self._finalized = True
 
 
-class _KernelCompiler(Compiler):
+def _start_runtime() -> None:
+    """What machine code that makes arrays needs first: an allocator, which is compiled, too."""
+    rtsys.initialize(CPUDispatcher.targetdescr.target_context)
+
+
+class _LibraryCompiler(Compiler):
+    """A compiler that keeps what it makes in a library of ours."""
+
+    def _use(self, library: _Library) -> None:
+        if self.state.flags.nrt:
+            library._reload_init.add(_start_runtime)  # also by who links it and is loaded
+        self.state.library = library
+
+
+class _KernelCompiler(_LibraryCompiler):
     """What makes a kernel that Python calls."""
 
     def compile_extra(self, function: Kernel) -> CompileResult:
         _LOG.info("compiling %s", function.__qualname__)
-        self.state.library = _Library(self.state.targetctx.codegen(), function.__qualname__)
-        self.state.library.enable_object_caching()
+        library = _KernelLibrary(self.state.targetctx.codegen(), function.__qualname__)
+        library.enable_object_caching()
+        self._use(library)
         with _garbage_left():
             return super().compile_extra(function)
 
@@ -134,12 +179,12 @@ def _garbage_left() -> Iterator[None]:
         gc.enable()
 
 
-class _PartCompiler(Compiler):
+class _PartCompiler(_LibraryCompiler):
     """What makes a kernel that kernels call."""
 
     def compile_extra(self, function: Kernel) -> CompileResult:
         library = _PartLibrary(self.state.targetctx.codegen(), function.__qualname__)
-        self.state.library = library
+        self._use(library)
         self.state.flags.no_compile = True
         result = super().compile_extra(function)
         library.finalize()

@@ -10,6 +10,7 @@ from .._kernels import refinement as kernels
 from .._kernels.surfaces import fill_jets, fill_log_costs
 from ..surface import Surface
 from ..validation import Array
+from .curve import spline_through
 
 STATIONARY = 1e-9  # largest derivative of the energy, as a share of it, at the path found
 SETTLED = 1e-9  # largest move of Newton's method, as a share of a mean piece, at a minimum
@@ -176,11 +177,7 @@ def settle(surface: Surface, points: Array) -> Array:
 
 def resample(points: Array, pieces: int) -> Array:
     """As many pieces, equal in the curve's parameter, of the smooth curve through the points."""
-    from scipy.interpolate import make_interp_spline
-
-    shares = np.linspace(0.0, 1.0, len(points))
-    curve = make_interp_spline(shares, points, k=min(3, len(points) - 1))
-    return np.ascontiguousarray(curve(np.linspace(0.0, 1.0, pieces + 1)))
+    return spline_through(points, 3)(np.linspace(0.0, 1.0, pieces + 1))
 
 
 def shortest_polyline(surface: Surface, points: Array, pieces: tuple[int, ...]) -> Array:

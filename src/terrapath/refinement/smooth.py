@@ -10,16 +10,14 @@ step serves to correct it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from .._kernels.surfaces import fill_metric
 from ..surface import Surface
 from ..validation import Array
+from .curve import Curve, spline_through
 from .newton import Lifted, farthest_move, lift, newton_step
-
-Curve = Callable[..., Array]  # shares of the way (m,) -> points (m, 2); with n: n-th derivative
 
 FEWEST_PIECES = 7  # that the differences fit into
 MOST_CORRECTIONS = 12
@@ -86,12 +84,7 @@ def correct(surface: Surface, points: Array) -> Array | None:
 
 def curve_through(points: Array) -> Curve:
     """The smooth curve through vertices (m, 2), as a function of the share of the way."""
-    from scipy.interpolate import make_interp_spline
-
-    pieces = len(points) - 1
-    shares = np.linspace(0.0, 1.0, pieces + 1)
-    curve: Curve = make_interp_spline(shares, points, k=5 if pieces > 5 else min(3, pieces))
-    return curve
+    return spline_through(points, 5 if len(points) > 6 else 3)
 
 
 def laid_shares(surface: Surface, curve: Curve, pieces: int, tolerance: float) -> Array:

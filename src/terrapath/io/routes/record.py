@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import __version__
 from ...problem import Solution
@@ -15,17 +16,22 @@ from ...problem import Solution
 
 def plain(value: Any) -> Any:
     """The value as JSON knows it: it has no infinity, no NaN and no arrays."""
+    if isinstance(value, float):  # first, for paths have thousands
+        return float(value) if math.isfinite(value) else None
     if isinstance(value, dict):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, np.ndarray):
-        return plain(value.tolist())
+        numbers = value.tolist()
+        return numbers if _is_finite(value) else plain(numbers)
     if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]
     if isinstance(value, np.generic):
         return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
+    return value if value is None or isinstance(value, bool | int | str) else str(value)
+
+
+def _is_finite(array: NDArray[Any]) -> bool:
+    return array.dtype.kind in "fiu" and bool(np.isfinite(array).all())
 
 
 def dump(record: Any, indent: int | None = None) -> str:
