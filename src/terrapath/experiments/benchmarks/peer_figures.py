@@ -10,7 +10,7 @@ from ..figures import new_figure, save_figure
 from .figures import TARGET_COLOUR, label_percent, label_plain
 from .grids import METHODS, GridsData
 from .growth import GROWTH_TARGET, GrowthData
-from .trees import NEAR, SceneTrees, TreesData
+from .trees import NEAR, Best, SceneTrees, TreesData
 
 # Colours by program, lines by planner.
 COLOURS = {"terrapath": "#08519c", "ompl-cpp": "#d95f0e", "ompl-python": "#7f7f7f"}
@@ -18,6 +18,13 @@ LINES = {"rrt-star-r": "-", "rrt-star": "-", "informed-rrt-star": "--", "bit-sta
 
 # Excesses below this are not shown.
 LEAST_EXCESS = 1e-5
+
+
+def _line(best: Best) -> str:
+    options = dict(best.options)
+    if options.get("refine"):
+        return "-."
+    return "--" if options.get("informed") else LINES[best.contender.planner]
 
 
 def _draw_scene_trees(axes: Any, scene: SceneTrees) -> None:
@@ -33,8 +40,7 @@ def _draw_scene_trees(axes: Any, scene: SceneTrees) -> None:
         if not rows:
             continue
         seconds, low, middle, high = zip(*rows, strict=True)
-        informed = dict(best.options).get("informed", False)
-        style = "--" if informed else LINES.get(contender.planner, "-.")
+        style = _line(best)
         colour = COLOURS[contender.program]
         name = label.replace("\\", "")
         axes.loglog(seconds, middle, style, color=colour, lw=1.8, label=name)

@@ -175,6 +175,7 @@ _BATCHES: tuple[Options, ...] = tuple(
 )
 
 OURS, OURS_INFORMED = "RRT\\*-R", "RRT\\*-R, informed"
+OURS_REFINED = "RRT\\*-R, informed and refined"
 CPP_RRT, PYTHON_RRT = "OMPL RRT\\* in C++", "OMPL RRT\\* through Python"
 
 
@@ -190,6 +191,14 @@ def contenders(side: float) -> list[Contender]:
         )
         for label in (OURS, OURS_INFORMED)
     ]
+    own.append(
+        Contender(
+            label=OURS_REFINED,
+            program=TERRAPATH,
+            planner="rrt-star-r",
+            choices=((("informed", True), ("refine", True)),),
+        )
+    )
     kinds = {
         "RRT\\*": ("rrt-star", ompl),
         "Informed RRT\\*": ("informed-rrt-star", ompl),
