@@ -168,7 +168,8 @@ def test_a_target_from_below():
 
 def test_peers_that_are_missing_are_named_and_left_out(runner, no_peers, here):
     data = trees.run_trees(TINY, runner)
-    assert list(data.scenes["six-peaks"].found) == [trees.OURS, trees.OURS_INFORMED]
+    own = [trees.OURS, trees.OURS_INFORMED, trees.OURS_REFINED]
+    assert list(data.scenes["six-peaks"].found) == own
     assert trees.trees_targets(data) == []
     text = "\n".join(peer_report.trees_lines(data))
     assert "A program was left out: its source comes with terrapath's repository" in text

@@ -30,7 +30,8 @@ class RRTStar:
     radius_factor : how many times the radius that optimality needs in theory.
     goal_bias : share of samples that are the goal, until it is reached.
     informed : leave out samples that cannot improve the best path, by the chord bound
-        (Gammell et al. 2014); ``False`` samples all of the region, as in the paper.
+        (Gammell et al. 2014), nor by the tree's own costs (Karaman et al. 2011); ``False``
+        samples all of the region, as in the paper.
     prune : leave out edges that the chord rules out; the tree is the same without.
     panel : longest stretch that one application of Line-R measures, map units; by default
         as long as the surface's features allow; ``math.inf`` is Algorithm 1 to the letter.
