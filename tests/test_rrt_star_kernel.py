@@ -11,6 +11,8 @@ import shapely
 import planner_oracles as oracles
 import terrapath as tp
 from terrapath import scenes
+from terrapath._kernels import rrt_star as kernels
+from terrapath._kernels import tree as trees
 from terrapath.planners import tree_search
 
 LAYERS = {
@@ -119,6 +121,54 @@ def test_pruning_changes_no_bit_on_a_spline_surface():
     np.testing.assert_array_equal(pruned.tree.parents, whole.tree.parents)
     np.testing.assert_array_equal(pruned.tree.costs, whole.tree.costs)
     assert 0 < pruned.counters["edges integrated"] < whole.counters["edges integrated"]
+
+
+# Informed
+
+
+def test_only_what_no_path_of_the_tree_could_gain_from_is_turned_away():
+    problem = scene("six-peaks", OBSTACLES)
+    surface, space = problem.surface.data, problem.free_space.data
+    planner = tp.RRTStar(samples=2000)
+    options = tree_search.TreeOptions(
+        planner=planner.name,
+        samples=planner.samples,
+        step=planner.step,
+        radius_factor=planner.radius_factor,
+        goal_bias=planner.goal_bias,
+        seed=planner.seed,
+        riemannian=True,
+        prune=True,
+        informed=True,
+    )
+    tree = tree_search._allocate(planner.samples, problem.surface)
+    settings = tree_search._kernel_options(problem, options)
+    tree_search._prepare(problem, tree, settings)
+    draws = np.random.default_rng(6).random((planner.samples, 3))
+    kernels.grow(surface, space, tree, settings, draws[:800])
+    counts = {"added": 0, "turned away": 0, "blocked": 0}
+    for draw in draws[800:]:
+        count, goal = tree.counters[trees.VERTICES], tree.counters[trees.GOAL]
+        x, y, worthwhile = kernels.sample(surface, tree, settings, draw)
+        rows, best = tree.places[:count].copy(), tree.places[goal, trees.COST]
+        radius = kernels.near_radius(tree, settings, count)
+        kernels.grow(surface, space, tree, settings, draw[None, :])
+        near = np.hypot(rows[:, 0] - x, rows[:, 1] - y) <= radius
+        if not worthwhile or not near.any():
+            continue
+        chords = [oracles.chord(LAYERS["six-peaks"], (x, y), tuple(row[:2])) for row in rows[near]]
+        onward = oracles.chord(LAYERS["six-peaks"], (x, y), problem.goal)
+        could_gain = (rows[near, trees.COST] + chords).min() + onward < best
+        if tree.counters[trees.VERTICES] > count:
+            counts["added"] += 1
+            assert could_gain
+        elif could_gain:
+            closest = rows[np.argmin(np.hypot(rows[:, 0] - x, rows[:, 1] - y)), :2]
+            assert not problem.free_space.segments_are_free(closest[None], np.array([[x, y]]))[0]
+            counts["blocked"] += 1
+        else:
+            counts["turned away"] += 1
+    assert min(counts.values()) >= 20
 
 
 # Counters

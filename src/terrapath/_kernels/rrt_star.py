@@ -4,7 +4,8 @@ What the paper leaves open, and what is done here: Algorithm 3 as printed never 
 Cost(v_new) after it changes v_min; that update is meant, and made. The goal joins the
 tree as a vertex as soon as one extension can reach it, and from then on is rewired like
 any other. An edge is as long as Line-R says but never shorter than its chord: both
-estimate its true length, and the chord is never above it.
+estimate its true length, and the chord is never above it. An informed tree turns vertices away
+that cannot make the best path shorter.
 """
 
 import math
