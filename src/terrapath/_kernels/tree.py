@@ -7,7 +7,7 @@ import numpy as np
 
 from .buckets import Buckets
 from .compiler import inner_kernel, kernel
-from .lengths import composite_boole
+from .lengths import composite_boole, norm
 from .surfaces import Metric, plus_layer, slope_at, spot_at, times_cost
 
 # Places in Tree.counters.
@@ -125,11 +125,12 @@ def survey(surface, graph, new, x, y):
 @kernel
 def edge_length(surface, graph, a, b, panel):
     """Length of the edge between two vertices by Line-R, in panels."""
-    p, q, v, w = graph.places[a], graph.places[b], graph.vertices[a], graph.vertices[b]
-    hp, hq = Metric(v.h11, v.h12, v.h22), Metric(w.h11, w.h12, w.h22)
+    p, q = graph.places[a], graph.places[b]
     dx, dy = q[X] - p[X], q[Y] - p[Y]
     panels = max(math.ceil(math.sqrt(dx * dx + dy * dy) / panel), 1)
-    return composite_boole(surface, p[X], p[Y], hp, q[X], q[Y], hq, panels)
+    dx, dy = dx / panels, dy / panels
+    ends = norm(graph.vertices[a], dx, dy) + norm(graph.vertices[b], dx, dy)
+    return composite_boole(surface, p[X], p[Y], dx, dy, ends, panels)
 
 
 @kernel
