@@ -22,7 +22,7 @@ LEAST_EXCESS = 1e-5
 
 def _line(best: Best) -> str:
     options = dict(best.options)
-    if options.get("refine"):
+    if options.get("refine") or options.get("new_state_rejection"):
         return "-."
     return "--" if options.get("informed") else LINES[best.contender.planner]
 

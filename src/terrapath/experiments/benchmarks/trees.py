@@ -23,8 +23,10 @@ from .timing import Target, Timing, percent, timed
 
 TERRAPATH, CPP, PYTHON = "terrapath", "ompl-cpp", "ompl-python"
 
-# Looks are this much apart, those of a sweep and those that are shown.
+# Looks are this much apart, those of a sweep and those that are shown; and a sweep ends after
+# this share of the samples or the time.
 SWEEP_GROWTH, GROWTH = 2.0, 1.25
+SWEEP_SHARE = 0.5
 
 # Excess over the optimum that all are to get within, and those that are shown.
 NEAR = 5e-3
@@ -127,6 +129,7 @@ class Contender:
 
     def runs(self, options: Options, seeds: int, scale: Scale, growth: float) -> list[TreeRun]:
         """One for each seed."""
+        share = SWEEP_SHARE if growth == SWEEP_GROWTH else 1.0
         first, last = {
             TERRAPATH: (scale.tree_looks[0], scale.tree_looks[1]),
             CPP: (scale.cpp_looks[0], scale.cpp_looks[1]),
@@ -141,7 +144,7 @@ class Contender:
                 options=options,
                 seed=seed,
                 first=float(first),
-                last=float(last),
+                last=share * last,
                 growth=growth,
             )
             for seed in range(seeds)
@@ -167,6 +170,14 @@ def _ompl_choices(side: float) -> tuple[Options, ...]:
         (("range", share * side), *options) for share in (1 / 12, 1 / 6, 1 / 3) for options in near
     )
 
+
+# As informed trees of terrapath's: vertices that cannot improve the path by the tree's own costs
+# are turned away.
+_REJECTING: Options = (
+    ("informed_sampling", 1),
+    ("new_state_rejection", 1),
+    ("use_admissible_heuristic", 0),
+)
 
 _BATCHES: tuple[Options, ...] = tuple(
     (("samples_per_batch", batch), ("rewire_factor", factor))
@@ -204,9 +215,13 @@ def contenders(side: float) -> list[Contender]:
         "Informed RRT\\*": ("informed-rrt-star", ompl),
         "BIT\\*": ("bit-star", _BATCHES),
     }
+    rejecting = tuple((*options, *_REJECTING) for options in ompl)
     cpp = [
         Contender(label=f"OMPL {label} in C++", program=CPP, planner=planner, choices=choices)
-        for label, (planner, choices) in kinds.items()
+        for label, (planner, choices) in {
+            **kinds,
+            "RRT\\*, informed and rejecting": ("rrt-star", rejecting),
+        }.items()
     ]
     # Not PRM*: its second thread waits for the interpreter, and it for the thread (OMPL 2.0).
     python = [
