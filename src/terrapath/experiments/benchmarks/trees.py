@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...planners import plan
 from ..runner import Runner
@@ -23,10 +23,15 @@ from .timing import Target, Timing, percent, timed
 
 TERRAPATH, CPP, PYTHON = "terrapath", "ompl-cpp", "ompl-python"
 
-# Looks are this much apart, those of a sweep and those that are shown; and a sweep ends after
-# this share of the samples or the time.
-SWEEP_GROWTH, GROWTH = 2.0, 1.25
-SWEEP_SHARE = 0.5
+
+class Looks(NamedTuple):
+    """When a run is looked at."""
+
+    growth: float  # of samples or seconds from one look to the next
+    share: float  # of all samples or seconds that may be given, at the last
+
+
+SWEEP, SHOWN = Looks(2.0, 0.5), Looks(1.25, 1.0)
 
 # Excess over the optimum that all are to get within, and those that are shown.
 NEAR = 5e-3
@@ -127,9 +132,8 @@ class Contender:
     as_of: str = ""  # label of the contender whose best options are taken in their place
     few: bool = False  # seeds
 
-    def runs(self, options: Options, seeds: int, scale: Scale, growth: float) -> list[TreeRun]:
+    def runs(self, options: Options, seeds: int, scale: Scale, looks: Looks) -> list[TreeRun]:
         """One for each seed."""
-        share = SWEEP_SHARE if growth == SWEEP_GROWTH else 1.0
         first, last = {
             TERRAPATH: (scale.tree_looks[0], scale.tree_looks[1]),
             CPP: (scale.cpp_looks[0], scale.cpp_looks[1]),
@@ -144,8 +148,8 @@ class Contender:
                 options=options,
                 seed=seed,
                 first=float(first),
-                last=share * last,
-                growth=growth,
+                last=looks.share * last,
+                growth=looks.growth,
             )
             for seed in range(seeds)
         ]
@@ -292,7 +296,7 @@ class _Comparison:
         """With its best options, all seeds."""
         options = self._best_options(contender)
         seeds = self.scale.few_tree_seeds if contender.few else self.scale.tree_seeds
-        curve = self._curve(contender, options, seeds, GROWTH)
+        curve = self._curve(contender, options, seeds, SHOWN)
         self.found[contender.label] = Best(contender, options, curve)
 
     def _best_options(self, contender: Contender) -> Options:
@@ -302,15 +306,15 @@ class _Comparison:
             return contender.choices[0]
         seeds = self.scale.sweep_seeds
         swept = [
-            (_score(self._curve(contender, options, seeds, SWEEP_GROWTH), self.optimum), options)
+            (_score(self._curve(contender, options, seeds, SWEEP), self.optimum), options)
             for options in contender.choices
         ]
         return min(swept, key=lambda pair: pair[0])[1]
 
     def _curve(
-        self, contender: Contender, options: Options, seeds: int, growth: float
+        self, contender: Contender, options: Options, seeds: int, looks: Looks
     ) -> MedianCurve:
-        runs = contender.runs(options, seeds, self.scale, growth)
+        runs = contender.runs(options, seeds, self.scale, looks)
         stage = f"{self.scene}, {contender.label}".replace("\\", "")
         return MedianCurve.of(self.runner.run(stage, [TreeTrial(self.scene, r) for r in runs]))
 
