@@ -132,6 +132,16 @@ def test_trees_are_compared_with_their_best_options_and_stored(runner, fake_ompl
     assert trees.run_trees(TINY, runner) == data
 
 
+def test_between_two_looks_the_logarithm_of_the_time_goes_with_the_length():
+    timing = tuple(Timing((s,), (s,)) for s in (1.0, 4.0, 16.0))
+    lengths = (math.inf, 12.0, 10.0)
+    curve = curves.MedianCurve(timing, lengths, lengths, lengths)
+    assert curve.time_between_looks(11.0) == pytest.approx(8.0)
+    assert curve.time_between_looks(10.0) == pytest.approx(16.0)
+    assert curve.time_between_looks(12.0) == curve.time_between_looks(13.0) == 4.0
+    assert curve.time_between_looks(9.0) is None
+
+
 def test_targets_of_trees_are_ratios_at_equal_length():
     def best(label, program, seconds, lengths):
         contender = trees.Contender(label=label, program=program, planner="x", choices=((),))

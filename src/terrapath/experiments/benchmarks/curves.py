@@ -84,3 +84,17 @@ class MedianCurve:
         """Seconds until the median is no longer than that; None where it never is."""
         pairs = zip(self.seconds, self.middle, strict=True)
         return next((seconds for seconds, middle in pairs if middle <= length), None)
+
+    def time_between_looks(self, length: float) -> float | None:
+        """The same, but between two looks as the logarithm of the time goes with the length.
+
+        It tells options apart that looks far from one another do not.
+        """
+        looks = list(zip(self.seconds, self.middle, strict=True))
+        k = next((k for k, (_, middle) in enumerate(looks) if middle <= length), None)
+        if k is None:
+            return None
+        (early, longer), (late, shorter) = looks[max(k - 1, 0)], looks[k]
+        if k == 0 or math.isinf(longer):
+            return late
+        return early * (late / early) ** ((longer - length) / (longer - shorter))

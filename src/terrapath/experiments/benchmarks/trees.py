@@ -279,7 +279,7 @@ class TreesData:
 
 def _score(curve: MedianCurve, optimum: Optimum) -> tuple[float, float]:
     """Less is better: the time to get near, and where that is never, how near."""
-    seconds = curve.time_to(optimum.length * (1.0 + NEAR))
+    seconds = curve.time_between_looks(optimum.length * (1.0 + NEAR))
     return (math.inf if seconds is None else seconds, curve.best)
 
 
