@@ -97,4 +97,4 @@ class MedianCurve:
         (early, longer), (late, shorter) = looks[max(k - 1, 0)], looks[k]
         if k == 0 or math.isinf(longer):
             return late
-        return early * (late / early) ** ((longer - length) / (longer - shorter))
+        return float(early * (late / early) ** ((longer - length) / (longer - shorter)))
