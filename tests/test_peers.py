@@ -295,8 +295,9 @@ def test_ompl_in_cpp_believes_what_our_edges_say(scene):
 def test_ompl_through_python_goes_around_obstacles(planner):
     if OMPL_PYTHON.version is None:
         pytest.skip(OMPL_PYTHON.missing)
-    choices = {c.planner: c.choices for c in trees.contenders(12.0) if c.program == trees.CPP}
-    options = choices[planner][-1]
+    contenders = trees.contenders(12.0)
+    as_of = next(c.as_of for c in contenders if (c.program, c.planner) == (trees.PYTHON, planner))
+    options = next(c.choices for c in contenders if c.label == as_of)[-1]
     task = {"scene": "three-peaks-discs", "planner": planner, "options": options, "seed": 0}
     found = processes.run_fresh(
         "ompl_python", {**task, "first": 0.5, "last": 1.0, "growth": 2.0}, "OMPL"
