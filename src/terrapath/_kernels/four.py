@@ -3,8 +3,8 @@
 LLVM turns loops over arrays into vector instructions, but neither a sum over the sixteen
 coefficients of a spline nor an exponential in the middle of a formula. Each function here is
 what it says in Python; ``_lowered_by`` tells the compiler the instructions to put in its
-place. A number beside a ``Four`` stands for four of it. Every operation is one that IEEE 754
-defines, in a fixed order, so the bits are the same on every processor.
+place. A number beside a ``Four`` stands for four of it. Every operation on fours is one that
+IEEE 754 defines, in a fixed order, so their bits are the same on every processor.
 """
 
 import math
@@ -181,11 +181,20 @@ def total(v):
     return (v[0] + v[2]) + (v[1] + v[3])
 
 
-# The exponential
+# Of a number or of four
 
 
-def _number_or_four(x):
-    return signature(_FOUR, x) if x == _FOUR else signature(types.float64, types.float64)
+def _of_number_or_four(build):
+    """Compile calls of a function of one argument by ``build``, whichever it is."""
+
+    def resolve(x):
+        return signature(_FOUR, x) if x == _FOUR else signature(types.float64, types.float64)
+
+    def declare(function):
+        lower_builtin(function, FourType)(build)
+        return _lowered_by(build, resolve, types.float64)(function)
+
+    return declare
 
 
 # Cody and Waite (1980): e^x = 2^n e^r with n = round(x / log 2), so that |r| <= (log 2) / 2;
@@ -197,11 +206,10 @@ _LOG2_HIGH, _LOG2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 _TAYLOR = [1.0 / math.factorial(k) for k in range(13, -1, -1)]
 
 
-def _exp_of_four(context, builder, signature, args):
+def _exp_of_four(builder, x):
     def constant(number):
         return ir.Constant(_VECTOR, [number] * 4)
 
-    x = args[0]
     for sign, limit in (("<", _LOWEST), (">", _HIGHEST)):
         beyond = builder.fcmp_ordered(sign, x, constant(limit))
         x = builder.select(beyond, constant(limit), x)
@@ -216,27 +224,23 @@ def _exp_of_four(context, builder, signature, args):
     return builder.bitcast(builder.add(builder.bitcast(power, _BITS), exponent), _VECTOR)
 
 
-def _exp_of_number(context, builder, signature, args):
+def _exp(context, builder, signature, args):
+    if signature.args[0] == _FOUR:
+        return _exp_of_four(builder, args[0])
     return _intrinsic(builder, "llvm.exp", args[0])
 
 
-@_lowered_by(_exp_of_number, _number_or_four, types.float64)
+@_of_number_or_four(_exp)
 def exp(x):
     """e^x of a number or of four: these within 1e-15, between e^-708 and e^709."""
     return np.exp(x)
-
-
-lower_builtin(exp, FourType)(_exp_of_four)
 
 
 def _sqrt(context, builder, signature, args):
     return _intrinsic(builder, "llvm.sqrt", args[0])
 
 
-@_lowered_by(_sqrt, _number_or_four, types.float64)
+@_of_number_or_four(_sqrt)
 def sqrt(x):
     """The square root of a number or of four."""
     return np.sqrt(x)
-
-
-lower_builtin(sqrt, FourType)(_sqrt)
