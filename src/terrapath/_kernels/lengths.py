@@ -6,7 +6,7 @@ import numpy as np
 
 from .compiler import allocating_kernel, inner_kernel, kernel
 from .four import four, sqrt, total
-from .surfaces import floor_of, speed_at, speeds_inside, value_at
+from .surfaces import floor_of, speed_at, speeds_inside, spot_at, value_at
 
 
 @inner_kernel
@@ -47,8 +47,9 @@ def chord(surface, ax, ay, bx, by):
     Never above the geodesic distance.
     """
     total = (bx - ax) * (bx - ax) + (by - ay) * (by - ay)
+    a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)
     for layer in range(surface.weights.shape[0]):
-        rise = value_at(surface, layer, bx, by) - value_at(surface, layer, ax, ay)
+        rise = value_at(surface, layer, b) - value_at(surface, layer, a)
         total += (surface.weights[layer] * rise) ** 2
     return floor_of(surface) * math.sqrt(total)
 

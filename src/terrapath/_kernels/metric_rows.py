@@ -8,8 +8,9 @@ import math
 
 import numpy as np
 
+from .bsplines import basis, basis_slope
 from .compiler import allocating_kernel, kernel, per_class
-from .surfaces import Peaks, Spline, basis, basis_slope, spline_cell
+from .surfaces import Peaks, Spline, spline_cell
 
 # Places in the rows that are filled in.
 H11, H12, H22, FX, FY = 0, 1, 2, 3, 4

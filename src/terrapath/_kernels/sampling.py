@@ -4,7 +4,7 @@ import math
 
 from .buckets import squared_distance
 from .compiler import inner_kernel, kernel
-from .surfaces import value_at
+from .surfaces import spot_at, value_at
 from .tree import COST, GOAL, LIFTED, X, Y
 
 
@@ -40,8 +40,9 @@ def can_improve(surface, tree, x, y):
     longest = tree.places[goal, COST] / tree.floor
     if math.sqrt(from_start) + math.sqrt(to_goal) >= longest:
         return False
+    spot = spot_at(surface, x, y)
     for layer in range(surface.weights.shape[0]):
-        z = surface.weights[layer] * value_at(surface, layer, x, y)
+        z = surface.weights[layer] * value_at(surface, layer, spot)
         from_start += (z - tree.places[0, LIFTED + layer]) ** 2
         to_goal += (z - tree.places[goal, LIFTED + layer]) ** 2
     return math.sqrt(from_start) + math.sqrt(to_goal) < longest

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .bsplines import Cell, basis, basis_curvature, basis_slope, column_sums, tensor_sum
 from .compiler import inner_kernel, kernel, per_class
-from .four import exp, four, four_in_row, fused, sqrt, total
+from .four import exp, four, fused, sqrt, total
 
 
 class Peaks(NamedTuple):
@@ -67,15 +68,6 @@ class Point(NamedTuple):
 
     x: float
     y: float
-
-
-class Cell(NamedTuple):
-    """Spline cell of a point, and the position inside it, both in [0, 1]."""
-
-    i: int
-    j: int
-    u: float
-    v: float
 
 
 class Spot(NamedTuple):
@@ -149,47 +141,6 @@ def spline_cell(surface, x, y):
 
 
 @inner_kernel
-def basis(u):
-    """The four uniform cubic B-splines that are alive at u in [0, 1]."""
-    constant, linear = four(1 / 6, 2 / 3, 1 / 6, 0.0), four(-0.5, 0.0, 0.5, 0.0)
-    square, cube = four(0.5, -1.0, 0.5, 0.0), four(-1 / 6, 0.5, -0.5, 1 / 6)
-    return fused(fused(fused(cube, u, square), u, linear), u, constant)
-
-
-@inner_kernel
-def basis_slope(u):
-    """First derivatives of ``basis``."""
-    constant, linear, square = (
-        four(-0.5, 0.0, 0.5, 0.0),
-        four(1.0, -2.0, 1.0, 0.0),
-        four(-0.5, 1.5, -1.5, 0.5),
-    )
-    return fused(fused(square, u, linear), u, constant)
-
-
-@inner_kernel
-def basis_curvature(u):
-    """Second derivatives of ``basis``."""
-    return fused(four(-1.0, 3.0, -3.0, 1.0), u, four(1.0, -2.0, 1.0, 0.0))
-
-
-@inner_kernel
-def column_sums(coefficients, layer, cell, by):
-    """Sums over the four columns of coefficients of a cell, weighted by ``by``."""
-    i, j = cell.i, cell.j
-    sums = by[0] * four_in_row(coefficients, layer, j, i)
-    sums = fused(by[1], four_in_row(coefficients, layer, j + 1, i), sums)
-    sums = fused(by[2], four_in_row(coefficients, layer, j + 2, i), sums)
-    return fused(by[3], four_in_row(coefficients, layer, j + 3, i), sums)
-
-
-@inner_kernel
-def tensor_sum(coefficients, layer, cell, bx, by):
-    """Sum over the sixteen coefficients of a cell, weighted by bx times by."""
-    return total(bx * column_sums(coefficients, layer, cell, by))
-
-
-@inner_kernel
 def spline_spot(surface, x, y):
     cell = spline_cell(surface, x, y)
     per_x, per_y = 1.0 / surface.dx, 1.0 / surface.dy
@@ -198,16 +149,23 @@ def spline_spot(surface, x, y):
 
 
 @inner_kernel
+def sums_and_rises(surface, layer, spot):
+    """Sums over the columns of a cell: of the values, and of their derivatives along y."""
+    return (
+        column_sums(surface.coefficients, layer, spot.cell, spot.by),
+        column_sums(surface.coefficients, layer, spot.cell, spot.sy),
+    )
+
+
+@inner_kernel
 def spline_slope(surface, layer, spot):
-    sums = column_sums(surface.coefficients, layer, spot.cell, spot.by)
-    rises = column_sums(surface.coefficients, layer, spot.cell, spot.sy)
+    sums, rises = sums_and_rises(surface, layer, spot)
     return Slope(total(spot.bx * sums), total(spot.sx * sums), total(spot.bx * rises))
 
 
 @inner_kernel
 def spline_slope_along(surface, layer, spot, vx, vy):
-    sums = column_sums(surface.coefficients, layer, spot.cell, spot.by)
-    rises = column_sums(surface.coefficients, layer, spot.cell, spot.sy)
+    sums, rises = sums_and_rises(surface, layer, spot)
     return total(fused(vx * spot.sx, sums, (vy * spot.bx) * rises))
 
 
@@ -305,9 +263,9 @@ def floor_of(surface):
 
 
 @inner_kernel
-def value_at(surface, layer, x, y):
+def value_at(surface, layer, spot):
     """Value of one layer, in the layer's unit."""
-    return slope_at(surface, layer, spot_at(surface, x, y)).f
+    return slope_at(surface, layer, spot).f
 
 
 @inner_kernel
@@ -377,8 +335,9 @@ def speeds_inside(surface, x, y, vx, vy):
 def fill_values(surface, points, values):
     """Values (m, layers)."""
     for m in range(points.shape[0]):
+        spot = spot_at(surface, points[m, 0], points[m, 1])
         for layer in range(surface.weights.shape[0]):
-            values[m, layer] = value_at(surface, layer, points[m, 0], points[m, 1])
+            values[m, layer] = value_at(surface, layer, spot)
 
 
 @inner_kernel
