@@ -130,19 +130,8 @@ def test_only_what_no_path_of_the_tree_could_gain_from_is_turned_away():
     problem = scene("six-peaks", OBSTACLES)
     surface, space = problem.surface.data, problem.free_space.data
     planner = tp.RRTStar(samples=2000)
-    options = tree_search.TreeOptions(
-        planner=planner.name,
-        samples=planner.samples,
-        step=planner.step,
-        radius_factor=planner.radius_factor,
-        goal_bias=planner.goal_bias,
-        seed=planner.seed,
-        riemannian=True,
-        prune=True,
-        informed=True,
-    )
     tree = tree_search._allocate(planner.samples, problem.surface)
-    settings = tree_search._kernel_options(problem, options)
+    settings = tree_search._kernel_options(problem, planner._tree_options())
     tree_search._prepare(problem, tree, settings)
     draws = np.random.default_rng(6).random((planner.samples, 3))
     kernels.grow(surface, space, tree, settings, draws[:800])

@@ -78,7 +78,10 @@ class RRTStar:
 
         Ctrl-C, too, ends the search with the best path so far.
         """
-        options = TreeOptions(
+        return search_tree(problem, self._tree_options(), callback)
+
+    def _tree_options(self) -> TreeOptions:
+        return TreeOptions(
             planner=self.name,
             samples=int(self.samples),
             step=self.step,
@@ -92,4 +95,3 @@ class RRTStar:
             time_limit=self.time_limit,
             target_length=self.target_length or 0.0,
         )
-        return search_tree(problem, options, callback)
