@@ -14,6 +14,7 @@ import pytest
 from terrapath import Circle, Problem, Surface, metric, scenes
 from terrapath.errors import InputError, TerrapathError
 from terrapath.experiments.benchmarks import (
+    contenders,
     curves,
     edges,
     grids,
@@ -109,12 +110,12 @@ def runner(tmp_path):
 def test_trees_are_compared_with_their_best_options_and_stored(runner, fake_ompl, monkeypatch):
     data = trees.run_trees(TINY, runner)
     scene = data.scenes["six-peaks"]
-    assert list(scene.found) == [c.label for c in trees.contenders(12.0)]
+    assert list(scene.found) == [c.label for c in contenders.contenders(12.0)]
     assert data.missing == []
-    ours = scene.found[trees.OURS].curve
+    ours = scene.found[contenders.OURS].curve
     assert len(ours.seconds) == len(ours.middle) == 8  # 200 * 1.25^k below 800, and 800
     assert scene.optimum.length == problems.find_optimum("six-peaks", None, None).length
-    theirs = scene.found[trees.CPP_RRT].curve
+    theirs = scene.found[contenders.CPP_RRT].curve
     assert theirs.seconds == (0.4, 0.9, 1.9)
     length = metric.curve_length(
         problems.load_problem("six-peaks").surface, np.reshape(PATH, (-1, 2))
@@ -144,15 +145,15 @@ def test_between_two_looks_the_logarithm_of_the_time_goes_with_the_length():
 
 def test_targets_of_trees_are_ratios_at_equal_length():
     def best(label, program, seconds, lengths):
-        contender = trees.Contender(label=label, program=program, planner="x", choices=((),))
+        contender = contenders.Contender(label=label, program=program, planner="x", choices=((),))
         timing = tuple(Timing((s,), (s,)) for s in seconds)
         return trees.Best(contender, (), curves.MedianCurve(timing, lengths, lengths, lengths))
 
     found = {
-        trees.OURS: best("", trees.TERRAPATH, (0.01, 0.02), (10.4, 10.0)),
-        trees.OURS_INFORMED: best("", trees.TERRAPATH, (0.01, 0.03), (10.4, 10.0)),
-        trees.CPP_RRT: best("", trees.CPP, (1.0, 2.0, 3.0), (11.0, 10.3, 10.3)),
-        trees.PYTHON_RRT: best("", trees.PYTHON, (5.0, 9.0), (math.inf, 10.5)),
+        contenders.OURS: best("", contenders.TERRAPATH, (0.01, 0.02), (10.4, 10.0)),
+        contenders.OURS_INFORMED: best("", contenders.TERRAPATH, (0.01, 0.03), (10.4, 10.0)),
+        contenders.CPP_RRT: best("", contenders.CPP, (1.0, 2.0, 3.0), (11.0, 10.3, 10.3)),
+        contenders.PYTHON_RRT: best("", contenders.PYTHON, (5.0, 9.0), (math.inf, 10.5)),
     }
     scene = trees.SceneTrees(problems.Optimum(10.0, None), found)
     data = trees.TreesData({"flat": scene}, 20, [], {})
@@ -164,7 +165,9 @@ def test_targets_of_trees_are_ratios_at_equal_length():
     # None of OMPL's got within 0.5 %; the longest of them tried for 9 s.
     assert near.found == pytest.approx(9.0 / 0.03)
     assert "at least" in near.what
-    lost = dataclasses.replace(scene, found={**found, trees.OURS: found[trees.PYTHON_RRT]})
+    lost = dataclasses.replace(
+        scene, found={**found, contenders.OURS: found[contenders.PYTHON_RRT]}
+    )
     cpp, *_ = trees.trees_targets(trees.TreesData({"flat": lost}, 20, [], {}))
     assert not cpp.met
     assert "does not get within 3 %" in cpp.verdict
@@ -178,7 +181,7 @@ def test_a_target_from_below():
 
 def test_peers_that_are_missing_are_named_and_left_out(runner, no_peers, here):
     data = trees.run_trees(TINY, runner)
-    own = [trees.OURS, trees.OURS_INFORMED, trees.OURS_REFINED]
+    own = [contenders.OURS, contenders.OURS_INFORMED, contenders.OURS_REFINED]
     assert list(data.scenes["six-peaks"].found) == own
     assert trees.trees_targets(data) == []
     text = "\n".join(peer_report.trees_lines(data))
@@ -268,7 +271,7 @@ def test_ompl_in_cpp_believes_what_our_edges_say(scene):
         pytest.skip(programs.OMPL_PLANNERS.missing)
     problem = problems.load_problem(scene)
     run = trees.TreeRun(
-        program=trees.CPP,
+        program=contenders.CPP,
         version="",
         planner="rrt-star",
         options=(("range", 3.0),),
@@ -295,9 +298,11 @@ def test_ompl_in_cpp_believes_what_our_edges_say(scene):
 def test_ompl_through_python_goes_around_obstacles(planner):
     if OMPL_PYTHON.version is None:
         pytest.skip(OMPL_PYTHON.missing)
-    contenders = trees.contenders(12.0)
-    as_of = next(c.as_of for c in contenders if (c.program, c.planner) == (trees.PYTHON, planner))
-    options = next(c.choices for c in contenders if c.label == as_of)[-1]
+    everyone = contenders.contenders(12.0)
+    as_of = next(
+        c.as_of for c in everyone if (c.program, c.planner) == (contenders.PYTHON, planner)
+    )
+    options = next(c.choices for c in everyone if c.label == as_of)[-1]
     task = {"scene": "three-peaks-discs", "planner": planner, "options": options, "seed": 0}
     found = processes.run_fresh(
         "ompl_python", {**task, "first": 0.5, "last": 1.0, "growth": 2.0}, "OMPL"

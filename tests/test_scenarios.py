@@ -19,8 +19,8 @@ from terrapath.cli.main import app, run
 from terrapath.errors import InputError
 from terrapath.io.scenario import read_scenario, scenario_schema
 from terrapath.options.listing import options
+from terrapath.options.problem import LayerTable
 from terrapath.options.scenario import Scenario
-from terrapath.options.sections import LayerTable
 
 ROOT = Path(__file__).parents[1]
 QUICK = ["--samples", "400", "--no-bound"]

@@ -11,16 +11,8 @@ import typer
 
 from ..errors import InputError
 from ..options.listing import Declared, options
-from ..options.sections import (
-    Extent,
-    Files,
-    LayerTable,
-    LayerTables,
-    Point,
-    Points,
-    Rectangle,
-    Weights,
-)
+from ..options.option import Extent, Files
+from ..options.problem import LayerTable, LayerTables, Point, Points, Rectangle, Weights
 
 Where = Annotated[
     str,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import MapError
-from ..options.sections import OutputSection
+from ..options.solution import OutputSection
 from .remarks import remark
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..errors import InputError
+from ..options.problem import Point
 from ..options.scenario import Scenario
-from ..options.sections import Point
 from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InputError
+from ..options.problem import MapSection, Point, Rectangle
 from ..options.scenario import Scenario
-from ..options.sections import MapSection, Point, Rectangle
 from .options import is_scenario
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..options.listing import Declared, declared, options
+from ..options.listing import SECTIONS, Declared, declared, options
+from ..options.problem import LayerTable
 from ..options.scenario import Scenario
-from ..options.sections import SECTIONS, LayerTable
 
 # A scenario is a page or two; what is larger is something else.
 MOST_BYTES = 1_000_000

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, MapError, OutsideSurfaceError
-from ..options.listing import Declared, declared, options
-from ..options.sections import SECTIONS, LayerTable
+from ..options.listing import SECTIONS, Declared, declared, options
+from ..options.problem import LayerTable
 from ..problem import Problem
 from ..scenes import load, names
 from ..surface import Surface

@@ -4,11 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, get_type_hints
 
 from .option import Option
-from .sections import SECTIONS
+from .problem import ConstraintsSection, MapSection, RouteSection
+from .solution import OutputSection, PlannerSection
+
+# Of a scenario file, in its order.
+SECTIONS: Mapping[str, type] = {
+    "map": MapSection,
+    "route": RouteSection,
+    "constraints": ConstraintsSection,
+    "planner": PlannerSection,
+    "output": OutputSection,
+}
 
 
 class Declared(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 # How pydantic reads a section: unknown keys are errors, and so are NaN and infinity.
 STRICT: dict[str, Any] = {"extra": "forbid", "allow_inf_nan": False}
@@ -47,6 +47,11 @@ def _forbid_conversion(schema: Any) -> None:
             _forbid_conversion(part)
 
 
+# Types of more than one section.
+Files: TypeAlias = tuple[str, ...]
+Extent: TypeAlias = float | Literal["auto", "none"]
+
+# What a value has to be, in words.
 NUMBER, WHOLE, SWITCH, TEXT = "a finite number", "a whole number", "true or false", "text"
 FILE, FILES = "the path of a file, as text", "a list of paths, each as text"
 A_POINT = "two finite numbers, [X, Y]"

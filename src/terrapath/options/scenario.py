@@ -9,13 +9,8 @@ from typing import Any, ClassVar
 
 from .listing import options
 from .option import STRICT
-from .sections import (
-    ConstraintsSection,
-    MapSection,
-    OutputSection,
-    PlannerSection,
-    RouteSection,
-)
+from .problem import ConstraintsSection, MapSection, RouteSection
+from .solution import OutputSection, PlannerSection
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,18 @@ from typing import Any, NamedTuple
 from ...planners import plan
 from ..runner import Runner
 from ..trials import Trial
+from .contenders import (
+    CPP,
+    CPP_RRT,
+    OURS,
+    OURS_INFORMED,
+    PYTHON,
+    PYTHON_RRT,
+    TERRAPATH,
+    Contender,
+    Options,
+    contenders,
+)
 from .curves import Curve, CurvePoint, MedianCurve, curve_of_looks
 from .exchange import write_problem
 from .peers import OMPL_PYTHON, Peer
@@ -20,8 +32,6 @@ from .processes import run_fresh
 from .programs import OMPL_PLANNERS, Program
 from .settings import Scale
 from .timing import Target, Timing, percent, timed
-
-TERRAPATH, CPP, PYTHON = "terrapath", "ompl-cpp", "ompl-python"
 
 
 class Looks(NamedTuple):
@@ -42,8 +52,6 @@ CPP_TARGET, PYTHON_TARGET, NEAR_TARGET = 20.0, 500.0, 20.0
 
 # Seconds that a process of Python may take until it plans, on the slowest machine.
 LOADING = 120.0
-
-Options = tuple[tuple[str, Any], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,127 +129,6 @@ class TreeTrial(Trial[Curve]):
         return run_fresh("ompl_python", task, what, 10.0 * self.planner.last + LOADING)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Contender:
-    """A planner, and the options of which the best are taken."""
-
-    label: str
-    program: str
-    planner: str
-    choices: tuple[Options, ...]
-    as_of: str = ""  # label of the contender whose best options are taken in their place
-    few: bool = False  # seeds
-
-    def runs(self, options: Options, seeds: int, scale: Scale, looks: Looks) -> list[TreeRun]:
-        """One for each seed."""
-        first, last = {
-            TERRAPATH: (scale.tree_looks[0], scale.tree_looks[1]),
-            CPP: (scale.cpp_looks[0], scale.cpp_looks[1]),
-            PYTHON: (scale.python_looks[0], scale.python_looks[1]),
-        }[self.program]
-        version = {TERRAPATH: None, CPP: OMPL_PLANNERS.version, PYTHON: OMPL_PYTHON.version}
-        return [
-            TreeRun(
-                program=self.program,
-                version=version[self.program],
-                planner=self.planner,
-                options=options,
-                seed=seed,
-                first=float(first),
-                last=looks.share * last,
-                growth=looks.growth,
-            )
-            for seed in range(seeds)
-        ]
-
-
-def _own_choices(side: float, *, informed: bool) -> tuple[Options, ...]:
-    return tuple(
-        (("step", share * side), ("radius_factor", factor), ("informed", informed))
-        for share in (1 / 12, 1 / 6, 1 / 3)
-        for factor in (0.75, 1.0, 1.5)
-    )
-
-
-def _ompl_choices(side: float) -> tuple[Options, ...]:
-    """All near vertices, or as many as theory asks for, or half as many; one or two steps."""
-    near: tuple[Options, ...] = (
-        (("use_k_nearest", 1), ("rewire_factor", 1.1)),
-        (("use_k_nearest", 1), ("rewire_factor", 1.0 / 8.0)),
-        (("use_k_nearest", 0), ("rewire_factor", 1.1)),
-    )
-    return tuple(
-        (("range", share * side), *options) for share in (1 / 12, 1 / 6, 1 / 3) for options in near
-    )
-
-
-# As informed trees of terrapath's: vertices that cannot improve the path by the tree's own costs
-# are turned away.
-_REJECTING: Options = (
-    ("informed_sampling", 1),
-    ("new_state_rejection", 1),
-    ("use_admissible_heuristic", 0),
-)
-
-_BATCHES: tuple[Options, ...] = tuple(
-    (("samples_per_batch", batch), ("rewire_factor", factor))
-    for batch in (100, 400)
-    for factor in (1.1, 0.75)
-)
-
-OURS, OURS_INFORMED = "RRT\\*-R", "RRT\\*-R, informed"
-OURS_REFINED = "RRT\\*-R, informed and refined"
-CPP_RRT, PYTHON_RRT = "OMPL RRT\\* in C++", "OMPL RRT\\* through Python"
-
-
-def contenders(side: float) -> list[Contender]:
-    """All planners that are compared. side : of the region, map units."""
-    ompl = _ompl_choices(side)
-    own = [
-        Contender(
-            label=label,
-            program=TERRAPATH,
-            planner="rrt-star-r",
-            choices=_own_choices(side, informed=label == OURS_INFORMED),
-        )
-        for label in (OURS, OURS_INFORMED)
-    ]
-    own.append(
-        Contender(
-            label=OURS_REFINED,
-            program=TERRAPATH,
-            planner="rrt-star-r",
-            choices=((("informed", True), ("refine", True)),),
-        )
-    )
-    kinds = {
-        "RRT\\*": ("rrt-star", ompl),
-        "Informed RRT\\*": ("informed-rrt-star", ompl),
-        "BIT\\*": ("bit-star", _BATCHES),
-    }
-    rejecting = tuple((*options, *_REJECTING) for options in ompl)
-    cpp = [
-        Contender(label=f"OMPL {label} in C++", program=CPP, planner=planner, choices=choices)
-        for label, (planner, choices) in {
-            **kinds,
-            "RRT\\*, informed and rejecting": ("rrt-star", rejecting),
-        }.items()
-    ]
-    # Not PRM*: its second thread waits for the interpreter, and it for the thread (OMPL 2.0).
-    python = [
-        Contender(
-            label=f"OMPL {label} through Python",
-            program=PYTHON,
-            planner=planner,
-            choices=choices[:1],
-            as_of=f"OMPL {label} in C++",
-            few=label != "RRT\\*",
-        )
-        for label, (planner, choices) in kinds.items()
-    ]
-    return [*own, *cpp, *python]
-
-
 @dataclass(frozen=True)
 class Best:
     """A contender on one scene, with its best options."""
@@ -311,10 +198,35 @@ class _Comparison:
         ]
         return min(swept, key=lambda pair: pair[0])[1]
 
+    def _runs(
+        self, contender: Contender, options: Options, seeds: int, looks: Looks
+    ) -> list[TreeRun]:
+        """One for each seed."""
+        scale = self.scale
+        first, last = {
+            TERRAPATH: (scale.tree_looks[0], scale.tree_looks[1]),
+            CPP: (scale.cpp_looks[0], scale.cpp_looks[1]),
+            PYTHON: (scale.python_looks[0], scale.python_looks[1]),
+        }[contender.program]
+        version = {TERRAPATH: None, CPP: OMPL_PLANNERS.version, PYTHON: OMPL_PYTHON.version}
+        return [
+            TreeRun(
+                program=contender.program,
+                version=version[contender.program],
+                planner=contender.planner,
+                options=options,
+                seed=seed,
+                first=float(first),
+                last=looks.share * last,
+                growth=looks.growth,
+            )
+            for seed in range(seeds)
+        ]
+
     def _curve(
         self, contender: Contender, options: Options, seeds: int, looks: Looks
     ) -> MedianCurve:
-        runs = contender.runs(options, seeds, self.scale, looks)
+        runs = self._runs(contender, options, seeds, looks)
         stage = f"{self.scene}, {contender.label}".replace("\\", "")
         return MedianCurve.of(self.runner.run(stage, [TreeTrial(self.scene, r) for r in runs]))
 

@@ -1,0 +1,109 @@
+"""Who takes part when trees are compared, and which of their options are tried."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+TERRAPATH, CPP, PYTHON = "terrapath", "ompl-cpp", "ompl-python"
+
+Options = tuple[tuple[str, Any], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contender:
+    """A planner, and the options of which the best are taken."""
+
+    label: str
+    program: str
+    planner: str
+    choices: tuple[Options, ...]
+    as_of: str = ""  # label of the contender whose best options are taken in their place
+    few: bool = False  # seeds
+
+
+def _own_choices(side: float, *, informed: bool) -> tuple[Options, ...]:
+    return tuple(
+        (("step", share * side), ("radius_factor", factor), ("informed", informed))
+        for share in (1 / 12, 1 / 6, 1 / 3)
+        for factor in (0.75, 1.0, 1.5)
+    )
+
+
+def _ompl_choices(side: float) -> tuple[Options, ...]:
+    """All near vertices, or as many as theory asks for, or half as many; one or two steps."""
+    near: tuple[Options, ...] = (
+        (("use_k_nearest", 1), ("rewire_factor", 1.1)),
+        (("use_k_nearest", 1), ("rewire_factor", 1.0 / 8.0)),
+        (("use_k_nearest", 0), ("rewire_factor", 1.1)),
+    )
+    return tuple(
+        (("range", share * side), *options) for share in (1 / 12, 1 / 6, 1 / 3) for options in near
+    )
+
+
+# As informed trees of terrapath's: vertices that cannot improve the path by the tree's own costs
+# are turned away.
+_REJECTING: Options = (
+    ("informed_sampling", 1),
+    ("new_state_rejection", 1),
+    ("use_admissible_heuristic", 0),
+)
+
+_BATCHES: tuple[Options, ...] = tuple(
+    (("samples_per_batch", batch), ("rewire_factor", factor))
+    for batch in (100, 400)
+    for factor in (1.1, 0.75)
+)
+
+OURS, OURS_INFORMED = "RRT\\*-R", "RRT\\*-R, informed"
+OURS_REFINED = "RRT\\*-R, informed and refined"
+CPP_RRT, PYTHON_RRT = "OMPL RRT\\* in C++", "OMPL RRT\\* through Python"
+
+
+def contenders(side: float) -> list[Contender]:
+    """All planners that are compared. side : of the region, map units."""
+    ompl = _ompl_choices(side)
+    own = [
+        Contender(
+            label=label,
+            program=TERRAPATH,
+            planner="rrt-star-r",
+            choices=_own_choices(side, informed=label == OURS_INFORMED),
+        )
+        for label in (OURS, OURS_INFORMED)
+    ]
+    own.append(
+        Contender(
+            label=OURS_REFINED,
+            program=TERRAPATH,
+            planner="rrt-star-r",
+            choices=((("informed", True), ("refine", True)),),
+        )
+    )
+    kinds = {
+        "RRT\\*": ("rrt-star", ompl),
+        "Informed RRT\\*": ("informed-rrt-star", ompl),
+        "BIT\\*": ("bit-star", _BATCHES),
+    }
+    rejecting = tuple((*options, *_REJECTING) for options in ompl)
+    cpp = [
+        Contender(label=f"OMPL {label} in C++", program=CPP, planner=planner, choices=choices)
+        for label, (planner, choices) in {
+            **kinds,
+            "RRT\\*, informed and rejecting": ("rrt-star", rejecting),
+        }.items()
+    ]
+    # Not PRM*: its second thread waits for the interpreter, and it for the thread (OMPL 2.0).
+    python = [
+        Contender(
+            label=f"OMPL {label} through Python",
+            program=PYTHON,
+            planner=planner,
+            choices=choices[:1],
+            as_of=f"OMPL {label} in C++",
+            few=label != "RRT\\*",
+        )
+        for label, (planner, choices) in kinds.items()
+    ]
+    return [*own, *cpp, *python]
