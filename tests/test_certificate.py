@@ -22,13 +22,14 @@ import certificate_oracles as oracles
 import planner_oracles
 import terrapath as tp
 from processes import in_another_process
-from terrapath import certificate, scenes
+from terrapath import certificate, proofs, scenes
 from terrapath._kernels import certificate as kernels
 from terrapath._kernels import surface_models, taylor
 from terrapath.bounding import Search, search_window
-from terrapath.certificate import Core, seal_of
+from terrapath.certificate import seal_of
 from terrapath.geodesics import trace_ray
 from terrapath.lattice import Lattice
+from terrapath.proofs import Core
 from test_optimality import FLAT, LAYOUTS, REGION
 from test_random_problems import star
 
@@ -442,11 +443,11 @@ def test_what_a_cell_needs_covers_all_samples_of_it(seed):
     problem = random_problem(random, on_spline=seed % 2 == 0)
     made = certified(problem, int(random.integers(6, 14)))
     steepest, needed = sample_cells(problem, made)
-    needs = certificate.cell_needs(problem, made, 0.0)
-    exempt = certificate.exempt_cells(problem, made)
+    needs = proofs.cell_needs(problem, made, 0.0)
+    exempt = proofs.exempt_cells(problem, made)
     assert (needs.proven[exempt] == 0.0).all()
     assert (needs.proven[~exempt] >= needed[~exempt] * (1.0 - 1e-12)).all()
-    norm = certificate.proven_norm(problem, made, needs.proven)
+    norm = proofs.proven_norm(problem, made, needs.proven)
     assert norm >= needed[~exempt].max(initial=0.0) * (1.0 - 1e-12)
     # Where the norm alone settles it, cutting cells up loses nothing.
     assert norm <= 1.05 * max(steepest[~exempt].max(), needs.likely.max())
@@ -466,7 +467,7 @@ def test_the_margin_of_a_core_is_below_all_samples_of_its_edge_and_near(seed):
     core = Core(*(int(k) for k in core))
     anchor = oracles.Terrain(problem.surface).lift(np.array([problem.goal]))[0]
     shifted = anchor - np.concatenate([problem.start, np.zeros(len(anchor) - 2)])
-    margin = certificate.edge_margin(problem, made, core, shifted, factor)
+    margin = proofs.edge_margin(problem, made, core, shifted, factor)
     x = np.linspace(lattice.x[core.column0], lattice.x[core.column1], 401)
     y = np.linspace(lattice.y[core.row0], lattice.y[core.row1], 401)
     edge = np.concatenate(
@@ -877,10 +878,10 @@ def test_a_lower_horizon_needs_less_of_every_cell_and_proves_less():
     problem = hills()
     made = certified(problem, 40, 17.0)
     low = resealed(made, horizon=made.horizon - 1.0)
-    before, after = (certificate.cell_needs(problem, c, 0.0).proven for c in (made, low))
+    before, after = (proofs.cell_needs(problem, c, 0.0).proven for c in (made, low))
     assert (after <= before * (1.0 + 1e-12)).all()
     assert (after < before).any()
-    assert certificate.proven_value(problem, low, low.norm) < made.value - 0.5
+    assert proofs.proven_value(problem, low, low.norm) < made.value - 0.5
     with pytest.raises(tp.CertificateError, match="no more than"):
         resealed(low, value=made.value).check(problem)
 
@@ -1006,7 +1007,7 @@ def test_a_random_function_proves_only_what_is_true(seed):
     for size in (1e-3, 1e-2, 0.1, 1.0):
         rough = made.coefficients + size * random.normal(size=made.coefficients.shape)
         proposal = replace(made, coefficients=rough)
-        needs = certificate.cell_needs(problem, proposal, 0.0)
+        needs = proofs.cell_needs(problem, proposal, 0.0)
         found = certificate.certify(problem, proposal, needs)
         assert found.check(problem) == found.value <= truth
         values.append(found.value)
@@ -1033,11 +1034,11 @@ def imports_of(module):
 
 
 def test_the_checker_shares_nothing_with_the_solver():
-    assert imports_of(certificate) == {
+    assert imports_of(certificate) == {"errors", "files", "problem", "proofs", "validation"}
+    assert imports_of(proofs) == {
         "_kernels.certificate",
         "_kernels.surfaces",
         "errors",
-        "files",
         "lattice",
         "problem",
         "surface.costs",

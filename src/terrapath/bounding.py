@@ -1,4 +1,4 @@
-"""Lower bounds on the length of every path: functions u that a certificate can be made of.
+"""Lower bounds on the length of every path: functions u that a claim can be made of.
 
 A distance field solves |du| = 1 up to its own small errors. Its values as coefficients of a
 B-spline average its slopes, which never overshoots at the kinks of the cut locus, and so make
@@ -18,10 +18,11 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
-from .certificate import Certificate, Core, Needs, cell_needs, certify, fingerprint
+from .certificate import Certificate, certify
 from .eikonal import Medium, march_from
 from .lattice import Lattice
 from .problem import Problem
+from .proofs import Claim, Core, Needs, cell_needs
 from .source_model import model_source, near_distance, window_radius
 from .validation import Array, Bounds, require_positive
 
@@ -131,14 +132,13 @@ class Search:
             lambda points: near_distance(problem.surface, problem.start, points),
         )
         self.start_core, self.goal_core = _cores(problem, lattice)
-        self.fingerprint = fingerprint(problem)
         self.repairs = 0
         self._solve()
 
     def _solve(self) -> None:
         u = self.medium.march(self.model, limit=self.cap)
         cap = min(self.cap, float(u[np.isfinite(u)].max(initial=0.0)))
-        self.proposal = Certificate(
+        self.proposal = Claim(
             value=0.0,
             norm=math.inf,
             coefficients=mollified(u, cap),
@@ -146,7 +146,6 @@ class Search:
             horizon=min(_horizon(self.problem, self.lattice, u, self.goal_core), cap),
             start_core=self.start_core,
             goal_core=self.goal_core,
-            fingerprint=self.fingerprint,
         )
         self.needs = cell_needs(self.problem, self.proposal, TOLERATED)
 

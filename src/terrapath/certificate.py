@@ -1,78 +1,39 @@
-"""Certificates: a function whose slope proves that no path is shorter, and its checker.
+"""Certificates: claims that know which problem they speak of, to be kept and checked again.
 
-Where |du| <= M in the dual norm of h, u / M grows by at most a path's length along it. So a
-path from start to goal is at least (u(goal) - u(start)) / M long. Nothing here knows how u
-was found: the checker trusts the problem's surface and obstacles, and nothing else.
+What is claimed, and how that is proven, is in ``proofs``. Here a claim gets the fingerprint of its
+problem, a seal, and a file.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
 import numbers
-from dataclasses import dataclass, replace
-from functools import cached_property, total_ordering
+from dataclasses import dataclass, fields, replace
+from functools import total_ordering
 from pathlib import Path as FilePath
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ._kernels import certificate as kernels
-from ._kernels.surfaces import Spline, fill_values
 from .errors import CertificateError, MapError
 from .files import written_whole
-from .lattice import Lattice
 from .problem import Problem
-from .surface.costs import span_within
-from .validation import Array, Bounds, as_array, as_bounds
-
-# Far above the rounding of the checker's own arithmetic, far below any gap.
-ROUNDING = 1e-9
-
-# Far above the rounding of a layer's value, in units of the last place of its largest.
-EPSILONS = 64.0
-
-# A norm is not proven any closer than this to what samples of it suggest.
-CLOSE = 3e-5
-
-# Nor below this, so that nothing overflows: a function that is steep nowhere proves nothing.
-FLATTEST = 1e-3
-
-Cells = npt.NDArray[np.bool_]
-
-
-class Core(NamedTuple):
-    """Cells around an end, [column0, column1) x [row0, row1), where the chord counts."""
-
-    column0: int
-    column1: int
-    row0: int
-    row1: int
+from .proofs import Claim, Core, Needs, proven_claim, require_proven, require_sound
+from .validation import as_array, as_bounds
 
 
 @total_ordering
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class Certificate(Claim):
     """A lower bound on the length of every path, with all that is needed to check it.
 
-    value : the bound, map units. norm : M, proven of the dual norm of du on all cells that
-    matter. horizon : W; cells matter from which the goal could be reached before u / M
-    is W / M. coefficients : (ny + 2, nx + 2), of the bicubic B-spline u on the cells of a
-    lattice over ``bounds``. start_core, goal_core : the cells around the ends, where the chord
-    takes the place of u. Outside ``bounds`` every path is long enough on the plane already.
-    fingerprint : of the problem that it speaks of. seal : a hash of all the others, so that
-    what was altered by mistake is told from what is wrong.
+    value : the bound, map units. norm, coefficients, bounds, horizon, start_core, goal_core : the
+    claim's, which proves the bound; what they are is told by ``proofs.Claim``. fingerprint : of
+    the problem that it speaks of. seal : a hash of all the others, so that what was altered by
+    mistake is told from what is wrong.
     A certificate compares with numbers as its value.
     """
 
-    value: float
-    norm: float
-    coefficients: Array
-    bounds: Bounds
-    horizon: float
-    start_core: Core
-    goal_core: Core
     fingerprint: str
     seal: str = ""
 
@@ -90,12 +51,6 @@ class Certificate:
     def __hash__(self) -> int:
         return hash(self.value)
 
-    @cached_property
-    def lattice(self) -> Lattice:
-        """The lattice whose cells u is given on."""
-        rows, columns = self.coefficients.shape
-        return Lattice(self.bounds, columns - 2, rows - 2)
-
     def check(self, problem: Problem) -> float:
         """Prove the claim again from nothing but the problem; returns the bound, map units.
 
@@ -106,27 +61,13 @@ class Certificate:
                 f"the certificate speaks of problem {self.fingerprint[:12]}, this is "
                 f"{fingerprint(problem)[:12]}: surface, weights, obstacles, start or goal differ"
             )
-        _require_sound(self)
+        require_sound(self)
         if self.seal != seal_of(self):
             raise CertificateError(
                 f"the certificate was altered after it was made: its seal is {self.seal[:12]!r}, "
                 f"what it holds makes {seal_of(self)[:12]!r}"
             )
-        found = cell_needs(problem, self, self.norm)
-        norm = proven_norm(problem, self, found.proven, self.norm)
-        # Another machine's exponentials may differ in the last digit.
-        alike = 1.0 + 1e-3 * ROUNDING
-        if not norm <= self.norm * alike:
-            raise CertificateError(
-                f"the dual norm is claimed to be at most {self.norm:.12g}, but no less than "
-                f"{norm:.12g} can be proven"
-            )
-        proven = proven_value(problem, self, self.norm)
-        if not self.value <= proven * alike:
-            raise CertificateError(
-                f"the bound is claimed to be {self.value:.12g}, but no more than {proven:.12g} "
-                "can be proven"
-            )
+        require_proven(problem, self)
         return self.value
 
     def save(self, path: str | FilePath) -> None:
@@ -200,267 +141,12 @@ def _hash(*parts: Any) -> str:
     return digest.hexdigest()
 
 
-class Ground(NamedTuple):
-    """The surface and the ends as kernels read them, the start being the origin of the plane.
-
-    So no digits are lost far from the map's own origin, nor between ends that lie close.
-    """
-
-    surface: Any
-    start: Array  # lifted, (2 + layers,)
-    goal: Array
-
-
-def _ground(problem: Problem) -> Ground:
-    (x, y), data = problem.start, problem.surface.data
-    moved: Any
-    if isinstance(data, Spline):
-        moved = data._replace(x0=data.x0 - x, y0=data.y0 - y)
-    else:
-        moved = data._replace(peaks=data.peaks - (0.0, 0.0, x, y))
-    ends = np.array([problem.start, problem.goal]) - (x, y)
-    values = np.empty((2, len(data.weights)))
-    fill_values(moved, ends, values)
-    return Ground(moved, *np.concatenate([ends, values * data.weights], axis=1))
-
-
-def _doubt(surface: Any) -> float:
-    """What rounding may add to a chord of a surface, for its layers' values, map units."""
-    if isinstance(surface, Spline):
-        sizes = np.abs(surface.coefficients).max(axis=(1, 2))
-    else:
-        sizes = np.add.reduceat(np.append(np.abs(surface.peaks[:, 0]), 0.0), surface.first[:-1])
-        sizes[np.diff(surface.first) == 0] = 0.0
-    return EPSILONS * float(np.finfo(np.float64).eps) * math.hypot(*(sizes * surface.weights))
-
-
-def _bound(problem: Problem, certificate: Certificate) -> kernels.Bound:
-    """The function u, the start being the origin."""
-    (x, y), lattice = problem.start, certificate.lattice
-    corner_x, corner_y = lattice.bounds.x1_min - x, lattice.bounds.x2_min - y
-    return kernels.Bound(certificate.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
-
-
-def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
-    """Room for the pieces that a cell is cut into at the surface's knots."""
-    data: Any = problem.surface.data
-    step = min(data.dx, data.dy) if hasattr(data, "dx") else math.inf
-    return kernels.Cutting(
-        np.empty(int(lattice.dx / step) + 4),
-        np.empty(int(lattice.dy / step) + 4),
-        np.empty((2 * len(data.weights), 11)),
-        np.empty((3 * kernels.DEPTH + 1, 5)),
-    )
-
-
-def exempt_cells(problem: Problem, certificate: Certificate) -> Cells:
-    """Cells (ny, nx) that no path meets between its start core and its goal core."""
-    exempt = problem.free_space.covered_cells(certificate.lattice)
-    for core in (certificate.start_core, certificate.goal_core):
-        exempt[core.row0 : core.row1, core.column0 : core.column1] = True
-    return exempt
-
-
-class Needs(NamedTuple):
-    """For each cell (ny, nx), the dual norm's bound M that it needs."""
-
-    proven: Array  # enough, by proof
-    likely: Array  # what nine points of the cell need
-    slope: Array  # the dual norm of du at those points
-
-
-def cell_needs(problem: Problem, certificate: Certificate, enough: float) -> Needs:
-    """For each cell an M that is enough.
-
-    In each cell the dual norm of du is at most M, or every path through it is long enough by
-    the chord from there to the goal. Cells for which ``enough`` is proven are not looked at
-    any closer.
-    """
-    _require_fit(problem, certificate)
-    lattice, ground = certificate.lattice, _ground(problem)
-    found, likely, slope = np.empty((3, lattice.ny - 1, lattice.nx - 1))
-    kernels.fill_needs(
-        ground.surface,
-        _bound(problem, certificate),
-        ground.goal,
-        float(certificate.horizon),
-        exempt_cells(problem, certificate),
-        float(enough) / (1.0 + ROUNDING),
-        _cutting(problem, lattice),
-        found,
-        likely,
-        slope,
-    )
-    return Needs(found * (1.0 + ROUNDING), likely, slope)
-
-
-def proven_norm(
-    problem: Problem, certificate: Certificate, found: Array, enough: float = 0.0
-) -> float:
-    """The least M that is proven to be enough for all cells, or ``enough`` where that is more.
-
-    found : what they need, proven; the largest are looked at closely.
-    """
-    ground = _ground(problem)
-    norm = kernels.least_norm(
-        ground.surface,
-        _bound(problem, certificate),
-        ground.goal,
-        float(certificate.horizon),
-        np.argsort(found, axis=None)[::-1],
-        found,
-        float(enough) / (1.0 + ROUNDING),
-        _cutting(problem, certificate.lattice),
-    )
-    return float(norm) * (1.0 + ROUNDING)
-
-
-def _require_sound(certificate: Certificate) -> None:
-    """Raise CertificateError where a number is none, or the coefficients are no spline's."""
-    value, norm, horizon = certificate.value, certificate.norm, certificate.horizon
-    if not (all(map(math.isfinite, (value, norm, horizon))) and norm > 0.0):
-        raise CertificateError(
-            f"value={value}, norm={norm} and horizon={horizon} must be finite, the norm above 0"
-        )
-    shape, kind = certificate.coefficients.shape, certificate.coefficients.dtype
-    if not (len(shape) == 2 and min(shape) >= 4 and kind == np.float64):
-        raise CertificateError(
-            f"coefficients of type {kind} and shape {shape} make no spline; (ny + 2, nx + 2) "
-            "with 2 x 2 nodes at least is expected"
-        )
-    if not np.isfinite(certificate.coefficients).all():
-        raise CertificateError("the coefficients are not all finite")
-
-
-def _require_fit(problem: Problem, certificate: Certificate) -> None:
-    """Raise CertificateError where the parts do not belong together."""
-    if not problem.bounds.encloses(certificate.bounds):
-        raise CertificateError(
-            f"the certificate covers {certificate.bounds}, which is not within {problem.bounds}"
-        )
-    lattice = certificate.lattice
-    for name, point in (("start", problem.start), ("goal", problem.goal)):
-        core: Core = getattr(certificate, f"{name}_core")
-        fits = (
-            all(isinstance(k, int) for k in core)
-            and 0 <= core.column0 < core.column1 < lattice.nx
-            and 0 <= core.row0 < core.row1 < lattice.ny
-        )
-        if not (fits and _extent(lattice, core).contains(np.asarray(point))):
-            raise CertificateError(
-                f"the {name} core {tuple(core)} does not hold the {name} {point}"
-            )
-
-
-def _extent(lattice: Lattice, core: Core) -> Bounds:
-    x, y = lattice.x, lattice.y
-    return Bounds(x[core.column0], y[core.row0], x[core.column1], y[core.row1])
-
-
-def _overlap(a: Core, b: Core) -> bool:
-    return a.column0 < b.column1 and b.column0 < a.column1 and a.row0 < b.row1 and b.row0 < a.row1
-
-
-def _anchor(problem: Problem, certificate: Certificate, core: Core, end: Array) -> kernels.Anchor:
-    """An end of all paths, (2 + layers,) lifted, and what is sure of the ground around its core.
-
-    The ground is the core and half as much again on all sides. A path of length s there, costs left
-    out, has met no cost below c - G s, c being that at the end and G the steepest slope; so to
-    a distance of d it is (c - G d / 2) d long.
-    """
-    surface, data = problem.surface, problem.surface.data
-    if not (surface.costs and isinstance(data, Spline)):
-        return kernels.Anchor(end, 1.0, math.inf)
-    x0, y0, x1, y1 = _extent(certificate.lattice, core)
-    width, height = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
-    around = Bounds(x0 - width, y0 - height, x1 + width, y1 + height)
-    (x, y), bounds = np.array(problem.start) + end[:2], problem.bounds
-    # Beyond the bounds no path can go.
-    sides = (
-        (x - around.x1_min, around.x1_min > bounds.x1_min),
-        (y - around.x2_min, around.x2_min > bounds.x2_min),
-        (around.x1_max - x, around.x1_max < bounds.x1_max),
-        (around.x2_max - y, around.x2_max < bounds.x2_max),
-    )
-    far = min((distance for distance, is_inside in sides if is_inside), default=math.inf)
-    found, cost = span_within(data, around), float(surface.cost((x, y)))
-    farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
-    floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
-    return kernels.Anchor(end, floor, found.least * (1.0 - ROUNDING) * float(far))
-
-
-def edge_margin(
-    problem: Problem, certificate: Certificate, core: Core, end: Array, factor: float
-) -> float:
-    """At most distance(end, p) + factor u(p) for all p on the edge of a core, map units.
-
-    end (2 + layers,) : a lifted point, the start being the origin of the plane. The distance is
-    bounded by the chord and the least cost around.
-    """
-    return float(
-        kernels.margin_of_core(
-            _ground(problem).surface,
-            _bound(problem, certificate),
-            _anchor(problem, certificate, core, end),
-            float(factor),
-            core.column0,
-            core.column1,
-            core.row0,
-            core.row1,
-            _cutting(problem, certificate.lattice),
-        )
-    )
-
-
-def proven_value(problem: Problem, certificate: Certificate, norm: float) -> float:
-    """The bound that follows where the dual norm is at most ``norm``, map units.
-
-    Let a path leave the start core for the last time at p, and enter the goal core after
-    that for the first time at q. It is at least distance(start, p) + (u(q) - u(p)) / M +
-    distance(q, goal) long, or meets a cell from where it is at least (W - u(p)) / M to the goal.
-    """
-    surface, start, goal = _ground(problem)
-    doubt = _doubt(surface)
-    least = problem.surface.least_cost
-    straight = max(least * (math.dist(start, goal) * (1.0 - ROUNDING) - doubt), 0.0)
-    if _overlap(certificate.start_core, certificate.goal_core):
-        return straight
-    detour = least * least_detour(problem, certificate.bounds) * (1.0 - ROUNDING)
-    first = edge_margin(problem, certificate, certificate.start_core, start, -1.0 / norm)
-    last = edge_margin(problem, certificate, certificate.goal_core, goal, 1.0 / norm)
-    rest = min(last, certificate.horizon / norm)
-    within = first + rest - ROUNDING * (abs(first) + abs(rest)) - least * doubt
-    # No number, where something overflowed.
-    return max(min(within, detour), straight) if within > straight else straight
-
-
-def least_detour(problem: Problem, window: Bounds) -> float:
-    """The least length on the plane of a path that leaves a window of the problem's bounds.
-
-    It is at least as long as the planar way by a side of the window: to the goal's mirror
-    image there.
-    """
-    (x0, y0), (x1, y1) = problem.start, problem.goal
-    outer, found = problem.bounds, math.inf
-    # Differences first: far from the map's origin the sum of two places loses digits.
-    for side, edge in ((window.x1_min, outer.x1_min), (window.x1_max, outer.x1_max)):
-        if side != edge:
-            found = min(found, math.hypot((x0 - side) + (x1 - side), y1 - y0))
-    for side, edge in ((window.x2_min, outer.x2_min), (window.x2_max, outer.x2_max)):
-        if side != edge:
-            found = min(found, math.hypot(x1 - x0, (y0 - side) + (y1 - side)))
-    return found
-
-
-def certify(problem: Problem, proposal: Certificate, found: Needs) -> Certificate:
-    """The proposal with the norm and the value that are proven; found : what its cells need.
+def certify(problem: Problem, proposal: Claim, found: Needs) -> Certificate:
+    """The certificate of the norm and the value that are proven; found : what the cells need.
 
     Where no norm can be proven, the straight line's length in R^n is the bound.
     """
-    enough = max(float(found.likely.max()) * (1.0 + CLOSE), FLATTEST)
-    norm = proven_norm(problem, proposal, found.proven, enough)
-    if not math.isfinite(norm):
-        nothing = np.zeros_like(proposal.coefficients)
-        proposal, norm = replace(proposal, coefficients=nothing, horizon=0.0), 1.0
-    made = replace(proposal, norm=norm, value=proven_value(problem, proposal, norm))
+    proven = proven_claim(problem, proposal, found)
+    claimed = {field.name: getattr(proven, field.name) for field in fields(Claim)}
+    made = Certificate(**claimed, fingerprint=fingerprint(problem))
     return replace(made, seal=seal_of(made))
