@@ -231,7 +231,10 @@ def test_a_callback_stops_the_search_by_returning_true(name, problem):
     assert solution.stopped_by == "callback"
     assert solution.samples == tree_search.CHUNK
     assert solution.status is tp.Status.SOLVED
-    unfinished = tp.plan(problem, name, samples=MANY, callback=lambda progress: True, step=0.05)
+    blind = {} if name == "rrt" else {"informed": False}
+    unfinished = tp.plan(
+        problem, name, samples=MANY, callback=lambda progress: True, step=0.05, **blind
+    )
     assert unfinished.status is tp.Status.NOT_FOUND
 
 
@@ -278,7 +281,8 @@ def test_ctrl_c_before_the_first_path_gives_no_path(problem):
     def interrupt(progress):
         raise KeyboardInterrupt
 
-    solution = tp.RRTStar(samples=MANY, step=0.05).solve(problem, callback=interrupt)
+    planner = tp.RRTStar(samples=MANY, step=0.05, informed=False)
+    solution = planner.solve(problem, callback=interrupt)
     assert solution.status is tp.Status.INTERRUPTED
     assert solution.path is None
     assert solution.cost is None

@@ -12,6 +12,7 @@ import planner_oracles as oracles
 import terrapath as tp
 from terrapath import scenes
 from terrapath._kernels import rrt_star as kernels
+from terrapath._kernels import sampling
 from terrapath._kernels import tree as trees
 from terrapath.planners import tree_search
 
@@ -126,38 +127,82 @@ def test_pruning_changes_no_bit_on_a_spline_surface():
 # Informed
 
 
-def test_only_what_no_path_of_the_tree_could_gain_from_is_turned_away():
-    problem = scene("six-peaks", OBSTACLES)
-    surface, space = problem.surface.data, problem.free_space.data
-    planner = tp.RRTStar(samples=2000)
+def grown(problem, planner, draws):
+    """A tree with some samples, and the kernels' settings."""
     tree = tree_search._allocate(planner.samples, problem.surface)
     settings = tree_search._kernel_options(problem, planner._tree_options())
     tree_search._prepare(problem, tree, settings)
-    draws = np.random.default_rng(6).random((planner.samples, 3))
-    kernels.grow(surface, space, tree, settings, draws[:800])
-    counts = {"added": 0, "turned away": 0, "blocked": 0}
-    for draw in draws[800:]:
-        count, goal = tree.counters[trees.VERTICES], tree.counters[trees.GOAL]
-        x, y, worthwhile = kernels.sample(surface, tree, settings, draw)
-        rows, best = tree.places[:count].copy(), tree.places[goal, trees.COST]
-        radius = kernels.near_radius(tree, settings, count)
-        kernels.grow(surface, space, tree, settings, draw[None, :])
-        near = np.hypot(rows[:, 0] - x, rows[:, 1] - y) <= radius
-        if not worthwhile or not near.any():
-            continue
-        chords = [oracles.chord(LAYERS["six-peaks"], (x, y), tuple(row[:2])) for row in rows[near]]
-        onward = oracles.chord(LAYERS["six-peaks"], (x, y), problem.goal)
-        could_gain = (rows[near, trees.COST] + chords).min() + onward < best
-        if tree.counters[trees.VERTICES] > count:
-            counts["added"] += 1
-            assert could_gain
-        elif could_gain:
-            closest = rows[np.argmin(np.hypot(rows[:, 0] - x, rows[:, 1] - y)), :2]
-            assert not problem.free_space.segments_are_free(closest[None], np.array([[x, y]]))[0]
-            counts["blocked"] += 1
-        else:
-            counts["turned away"] += 1
-    assert min(counts.values()) >= 20
+    kernels.grow(problem.surface.data, problem.free_space.data, tree, settings, draws)
+    return tree, settings
+
+
+def best_path(tree):
+    """Points (m, 2) from the start to the goal, and what each has cost."""
+    way = [int(tree.counters[trees.GOAL])]
+    while tree.vertices[way[-1]]["parent"] >= 0:
+        way.append(int(tree.vertices[way[-1]]["parent"]))
+    rows = tree.places[way[::-1]]
+    return rows[:, :2], rows[:, trees.COST]
+
+
+def test_a_share_of_informed_samples_lies_around_the_best_path():
+    problem, planner = scene("six-peaks", OBSTACLES), tp.RRTStar(samples=2000)
+    random = np.random.default_rng(6)
+    tree, settings = grown(problem, planner, random.random((800, 3)))
+    points, costs = best_path(tree)
+    radius, line = kernels.near_radius(tree, settings), shapely.LineString(points)
+    distances, worth = [], []
+    for draw in random.random((4000, 3)):
+        draw[0] *= sampling.PATH_SHARE
+        x, y, worthwhile = kernels.sample(problem.surface.data, tree, settings, draw)
+        share = draw[0] / sampling.PATH_SHARE
+        centre = [np.interp(share * costs[-1], costs, points[:, k]) for k in (0, 1)]
+        away = math.hypot(x - centre[0], y - centre[1])
+        assert away == pytest.approx(radius * draw[1] ** 2, abs=1e-9)
+        assert line.distance(shapely.Point(x, y)) <= away + 1e-9
+        distances.append(away / radius)
+        worth.append(worthwhile)
+    assert np.quantile(distances, 0.5) == pytest.approx(0.25, abs=0.02)
+    assert np.mean(worth) > 0.9  # the chord rules none of them out that is on the path
+
+
+def test_the_other_informed_samples_are_spread_over_the_ellipse():
+    problem, planner = scene("one-peak"), tp.RRTStar(samples=2000)
+    random = np.random.default_rng(7)
+    tree, settings = grown(problem, planner, random.random((800, 3)))
+    _, costs = best_path(tree)
+    draws = random.random((4000, 3))
+    draws[:, 0] = sampling.PATH_SHARE + (1.0 - sampling.PATH_SHARE) * draws[:, 0]
+    points = np.array([kernels.sample(problem.surface.data, tree, settings, d)[:2] for d in draws])
+    sums = sum(np.hypot(*(points - end).T) for end in (problem.start, problem.goal))
+    assert sums.max() <= costs[-1] + 1e-9
+    # The ellipse with its sum of distances s has the share s sqrt(s^2 - f^2) of the area.
+    focal = math.dist(problem.start, problem.goal)
+    half = 0.5 * (focal + costs[-1])
+    expected = half * math.sqrt(half**2 - focal**2)
+    expected /= costs[-1] * math.sqrt(costs[-1] ** 2 - focal**2)
+    assert np.mean(sums <= half) == pytest.approx(expected, abs=0.03)
+
+
+@pytest.mark.parametrize("step", [0.7, 1.0, 30.0])
+def test_an_informed_tree_begins_with_the_straight_way(step):
+    problem = scene("six-peaks")
+    steps = math.ceil(math.dist(problem.start, problem.goal) / step)
+    # The goal joins as soon as it is one step away.
+    solution = tp.RRTStar(samples=max(steps - 1, 1), step=step).solve(problem)
+    assert solution.length == pytest.approx(problem.straight_length, rel=1e-6)
+    assert len(solution.tree.points) == steps + 1
+
+
+def test_where_the_straight_way_is_blocked_samples_are_drawn_as_ever():
+    problem = scene("six-peaks", [shapely.box(4.0, 4.0, 6.0, 6.0)])
+    tree = tp.RRTStar(samples=8).solve(problem).tree
+    off_line = np.abs(tree.points[:, 0] - tree.points[:, 1]) > 1e-9
+    # Five steps lead straight to the box; the sixth is in the way.
+    assert not off_line[:6].any()
+    np.testing.assert_array_equal(tree.parents[1:6], np.arange(5))
+    assert tree.points[:6].max() < 4.0
+    assert len(tree.points) == 6 or off_line[6:].any()
 
 
 # Counters

@@ -4,8 +4,8 @@ What the paper leaves open, and what is done here: Algorithm 3 as printed never 
 Cost(v_new) after it changes v_min; that update is meant, and made. The goal joins the
 tree as a vertex as soon as one extension can reach it, and from then on is rewired like
 any other. An edge is as long as Line-R says but never shorter than its chord: both
-estimate its true length, and the chord is never above it. An informed tree turns vertices away
-that cannot make the best path shorter.
+estimate its true length, and the chord is never above it. An informed tree tries the straight
+way to the goal first.
 """
 
 import math
@@ -13,7 +13,7 @@ import math
 from .buckets import lay_out, nearest, put, resize, squared_distance, within
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
-from .sampling import area_to_search, distance_to_goal, sample
+from .sampling import distance_to_goal, near_radius, sample
 from .tree import (
     CHECKED,
     CONSIDERED,
@@ -24,11 +24,11 @@ from .tree import (
     PRUNED,
     REWIRED,
     SAMPLES,
+    STRAIGHT,
     VERTICES,
     X,
     Y,
     adopt,
-    chord_between,
     edge_length,
     pass_on_cost,
     place,
@@ -68,14 +68,6 @@ def candidate_is_free(space, tree, new, k):
 
 # Side of a bucket, in near radii.
 SIDE = 0.35
-
-
-@inner_kernel
-def near_radius(tree, options, vertices):
-    """min(step, radius * sqrt(area * log n / n)) (Karaman and Frazzoli 2011, d = 2)."""
-    n = max(vertices, 2)
-    area = area_to_search(tree, options)
-    return min(options.step, options.radius * math.sqrt(area * math.log(n) / n))
 
 
 @inner_kernel
@@ -211,34 +203,17 @@ def refresh_buckets(tree, options, radius):
 
 
 @kernel
-def cannot_improve(tree, options, new, promising):
-    """Is the best path, as far as there is one, as short as any through the new vertex can be?
-
-    None through it is shorter than the way to it, by the most promising candidate, and the
-    chord to the goal. What is turned away for costs that will fall later is drawn again, as
-    on the best way costs fall from the start onwards.
-    """
-    goal = tree.counters[GOAL]
-    if goal < 0 or not options.informed:
-        return False
-    come = tree.near[promising].cost + tree.near[promising].chord
-    return come + chord_between(tree, new, goal) >= tree.places[goal, COST]
-
-
-@kernel
 def extend(surface, space, tree, options, x, y):
     """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew."""
     new = tree.counters[VERTICES]
-    radius = near_radius(tree, options, new)
+    radius = near_radius(tree, options)
     refresh_buckets(tree, options, radius)
     x, y, count, closest = find_near(tree, options, radius, x, y)
     if tree.near[closest].squared == 0.0:
         return False
     place(surface, tree, new, x, y)
     promising = measure_chords(tree, new, count)
-    if promising < 0 or cannot_improve(tree, options, new, promising):
-        return False
-    if not candidate_is_free(space, tree, new, closest):
+    if promising < 0 or not candidate_is_free(space, tree, new, closest):
         return False
     tree.counters[CONSIDERED] += 2 * count - 1
     if not choose_parent(surface, space, tree, options, new, count, promising):
@@ -267,5 +242,7 @@ def grow(surface, space, tree, options, draws):
         tree.counters[SAMPLES] += 1
         x, y, worthwhile = sample(surface, tree, options, draws[m])
         grew = worthwhile and extend(surface, space, tree, options, x, y)
-        if grew and tree.counters[GOAL] < 0:
+        if not grew:
+            tree.counters[STRAIGHT] = 0
+        elif tree.counters[GOAL] < 0:
             join_goal(surface, space, tree, options)

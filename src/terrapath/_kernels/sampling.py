@@ -5,7 +5,11 @@ import math
 from .buckets import squared_distance
 from .compiler import inner_kernel, kernel
 from .surfaces import spot_at, value_at
-from .tree import COST, GOAL, LIFTED, X, Y
+from .tree import COST, GOAL, LIFTED, STRAIGHT, VERTICES, X, Y
+
+# Share of the samples of an informed tree that are drawn around the best path. With half of
+# them the tree is too thin elsewhere, and too often keeps to the valley that it found first.
+PATH_SHARE = 0.3
 
 
 @inner_kernel
@@ -29,6 +33,20 @@ def area_to_search(tree, options):
         focal = distance_to_goal(tree, options, 0)
         area = min(area, 0.25 * math.pi * longest * math.sqrt(max(longest**2 - focal**2, 0.0)))
     return area
+
+
+@inner_kernel
+def near_radius(tree, options):
+    """min(step, radius * sqrt(area * log n / n)) (Karaman and Frazzoli 2011, d = 2)."""
+    n = max(tree.counters[VERTICES], 2)
+    area = area_to_search(tree, options)
+    return min(options.step, options.radius * math.sqrt(area * math.log(n) / n))
+
+
+@inner_kernel
+def is_within_bounds(options, x, y):
+    """Is (x, y) in the region? Not where it is no number."""
+    return options.x0 <= x <= options.x1 and options.y0 <= y <= options.y1
 
 
 @kernel
@@ -63,25 +81,47 @@ def point_of_ellipse(tree, options, u, v):
     return x, y
 
 
+@inner_kernel
+def point_by_path(tree, options, share, u, v):
+    """A point at most a near radius from where the best path has run that share of its length.
+
+    Distances are spread over all scales: a quarter of them is less than a 16th of the radius.
+    """
+    vertex = tree.counters[GOAL]
+    run = share * tree.places[vertex, COST]
+    parent = tree.vertices[vertex].parent
+    while tree.places[parent, COST] > run:
+        vertex = parent
+        parent = tree.vertices[vertex].parent
+    p, q = tree.places[parent], tree.places[vertex]
+    along = (run - p[COST]) / (q[COST] - p[COST])
+    distance = near_radius(tree, options) * u * u
+    x = p[X] + along * (q[X] - p[X]) + distance * math.cos(2.0 * math.pi * v)
+    y = p[Y] + along * (q[Y] - p[Y]) + distance * math.sin(2.0 * math.pi * v)
+    return x, y
+
+
 @kernel
 def sample(surface, tree, options, draw):
     """A point to extend towards, and whether it is worth it.
 
     draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share
-    ``goal_bias`` of the samples is the goal. From then on, informed samples come from the
-    ellipse that holds all better paths, and those that the chord rules out are dropped
-    (Gammell, Srinivasa and Barfoot 2014, with the chord in place of the distance).
+    ``goal_bias`` of the samples is the goal, and of an informed tree as many of the first as
+    bring it straight towards the goal. From then on, informed samples come from around
+    the best path (Akgun and Stilman 2011), a share of them, and from the ellipse that holds
+    all better ones; those that the chord rules out are dropped (Gammell, Srinivasa and
+    Barfoot 2014, with the chord in place of the distance).
     """
     width, height = options.x1 - options.x0, options.y1 - options.y0
     x, y = options.x0 + draw[1] * width, options.y0 + draw[2] * height
     if tree.counters[GOAL] < 0:
-        if draw[0] < options.goal_bias:
+        if tree.counters[STRAIGHT] or draw[0] < options.goal_bias:
             x, y = options.goal_x, options.goal_y
         return x, y, True
     if not options.informed:
         return x, y, True
-    if area_to_search(tree, options) < width * height:
+    if draw[0] < PATH_SHARE:
+        x, y = point_by_path(tree, options, draw[0] / PATH_SHARE, draw[1], draw[2])
+    elif area_to_search(tree, options) < width * height:
         x, y = point_of_ellipse(tree, options, draw[1], draw[2])
-        if x < options.x0 or x > options.x1 or y < options.y0 or y > options.y1:
-            return x, y, False
-    return x, y, can_improve(surface, tree, x, y)
+    return x, y, is_within_bounds(options, x, y) and can_improve(surface, tree, x, y)

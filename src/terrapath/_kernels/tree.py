@@ -20,7 +20,8 @@ INTEGRATED = 5  # edges measured by Line-R
 CHECKED = 6  # edges tested against obstacles
 REWIRED = 7  # edges replaced by a better one
 LAID_OUT = 8  # vertices when the buckets were last laid out
-COUNTERS = 9
+STRAIGHT = 9  # 1 as long as the tree is growing straight from the start to the goal
+COUNTERS = 10
 
 
 # Entries of a row of Tree.places: all that the search for neighbours reads of a vertex.
@@ -155,6 +156,7 @@ def plant(surface, tree, options, x, y):
     tree.counters[:] = 0
     tree.counters[GOAL] = -1
     tree.counters[VERTICES] = 1
+    tree.counters[STRAIGHT] = options.informed
 
 
 @kernel
