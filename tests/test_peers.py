@@ -171,6 +171,16 @@ def test_targets_of_trees_are_ratios_at_equal_length():
     cpp, *_ = trees.trees_targets(trees.TreesData({"flat": lost}, 20, [], {}))
     assert not cpp.met
     assert "does not get within 3 %" in cpp.verdict
+    # Options that end nearer set the length; each side then has those that get there first.
+    late = {
+        contenders.in_the_end(contenders.OURS): best("", contenders.TERRAPATH, (0.05,), (10.0,)),
+        contenders.in_the_end(contenders.CPP_RRT): best("", contenders.CPP, (4.0,), (10.2,)),
+    }
+    for ours, seconds in ((found[contenders.OURS], 0.02), (found[contenders.PYTHON_RRT], 0.05)):
+        both = dataclasses.replace(scene, found={**found, **late, contenders.OURS: ours})
+        cpp, *_ = trees.trees_targets(trees.TreesData({"flat": both}, 20, [], {}))
+        assert cpp.found == pytest.approx(4.0 / seconds)
+        assert "within 2 %" in cpp.what
 
 
 def test_a_target_from_below():
@@ -182,6 +192,7 @@ def test_a_target_from_below():
 def test_peers_that_are_missing_are_named_and_left_out(runner, no_peers, here):
     data = trees.run_trees(TINY, runner)
     own = [contenders.OURS, contenders.OURS_INFORMED, contenders.OURS_REFINED]
+    own += [contenders.in_the_end(contenders.OURS)]
     assert list(data.scenes["six-peaks"].found) == own
     assert trees.trees_targets(data) == []
     text = "\n".join(peer_report.trees_lines(data))

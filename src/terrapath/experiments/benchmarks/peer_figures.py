@@ -20,8 +20,10 @@ LINES = {"rrt-star-r": "-", "rrt-star": "-", "informed-rrt-star": "--", "bit-sta
 LEAST_EXCESS = 1e-5
 
 
-def _line(best: Best) -> str:
+def _line(best: Best) -> Any:
     options = dict(best.options)
+    if best.contender.late:
+        return (0, (6, 1, 1, 1, 1, 1))
     if options.get("refine") or options.get("new_state_rejection"):
         return "-."
     return "--" if options.get("informed") else LINES[best.contender.planner]
@@ -43,7 +45,7 @@ def _draw_scene_trees(axes: Any, scene: SceneTrees) -> None:
         style = _line(best)
         colour = COLOURS[contender.program]
         name = label.replace("\\", "")
-        axes.loglog(seconds, middle, style, color=colour, lw=1.8, label=name)
+        axes.loglog(seconds, middle, ls=style, color=colour, lw=1.8, label=name)
         shown = [value if math.isfinite(value) else middle[k] for k, value in enumerate(high)]
         axes.fill_between(seconds, low, shown, color=colour, alpha=0.12, lw=0.0)
 

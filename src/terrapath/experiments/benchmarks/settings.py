@@ -35,8 +35,8 @@ class Scale:
     tree_seeds: int = 20
     few_tree_seeds: int = 5  # of OMPL's other planners through Python
     sweep_seeds: int = 3  # of each choice of options
-    tree_looks: tuple[int, int] = (100, 50_000)  # samples: the first, the last
-    cpp_looks: tuple[float, float] = (0.001, 2.5)  # seconds
+    tree_looks: tuple[int, int] = (20, 50_000)  # samples: the first, the last
+    cpp_looks: tuple[float, float] = (0.0002, 2.5)  # seconds
     python_looks: tuple[float, float] = (0.02, 4.0)
     optimum_gap: float = 1e-3  # to prove of the shortest paths that are not known
     optimum_seconds: float = 60.0

@@ -23,6 +23,7 @@ from .contenders import (
     Contender,
     Options,
     contenders,
+    in_the_end,
 )
 from .curves import Curve, CurvePoint, MedianCurve, curve_of_looks
 from .exchange import write_problem
@@ -164,9 +165,10 @@ class TreesData:
     versions: dict[str, str]
 
 
-def _score(curve: MedianCurve, optimum: Optimum) -> tuple[float, float]:
-    """Less is better: the time to get near, and where that is never, how near."""
-    seconds = curve.time_between_looks(optimum.length * (1.0 + NEAR))
+def _score(contender: Contender, curve: MedianCurve, optimum: Optimum) -> tuple[float, float]:
+    """Less is better: the time to get near, and where that is never or late, how near."""
+    near = optimum.length * (1.0 + NEAR)
+    seconds = None if contender.late else curve.time_between_looks(near)
     return (math.inf if seconds is None else seconds, curve.best)
 
 
@@ -193,7 +195,10 @@ class _Comparison:
             return contender.choices[0]
         seeds = self.scale.sweep_seeds
         swept = [
-            (_score(self._curve(contender, options, seeds, SWEEP), self.optimum), options)
+            (
+                _score(contender, self._curve(contender, options, seeds, SWEEP), self.optimum),
+                options,
+            )
             for options in contender.choices
         ]
         return min(swept, key=lambda pair: pair[0])[1]
@@ -260,13 +265,27 @@ def run_trees(scale: Scale, runner: Runner) -> TreesData:
 
 
 def _at_equal_length(scene: SceneTrees, peer: str) -> tuple[float | None, str]:
-    """The peer's seconds over ours for the shortest median length that it reaches."""
-    theirs = scene.found[peer].curve
-    if math.isinf(theirs.best):
+    """The peer's seconds over ours for the shortest median length that it reaches.
+
+    Each with the options that get there first.
+    """
+
+    def curves_of(label: str) -> list[MedianCurve]:
+        return [
+            scene.found[name].curve for name in (label, in_the_end(label)) if name in scene.found
+        ]
+
+    def least_time(curves: list[MedianCurve], length: float) -> float:
+        times = (curve.time_to(length) for curve in curves)
+        return min((seconds for seconds in times if seconds is not None), default=math.inf)
+
+    theirs = curves_of(peer)
+    shortest = min(curve.best for curve in theirs)
+    if math.isinf(shortest):
         return None, "it found no path in the time it was given"
-    seconds, ours = theirs.time_to(theirs.best), scene.found[OURS].curve.time_to(theirs.best)
-    level = percent(scene.excess(theirs.best))
-    if ours is None or seconds is None:
+    seconds, ours = least_time(theirs, shortest), least_time(curves_of(OURS), shortest)
+    level = percent(scene.excess(shortest))
+    if math.isinf(ours):
         return None, f"{OURS} does not get within {level}"
     return seconds / ours, level
 
