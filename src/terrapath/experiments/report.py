@@ -309,7 +309,11 @@ def _open_settings(settings: Settings) -> list[str]:
         ],
         ["distance that chooses neighbours", "Euclidean, on the plane"],
         ["samples that are the goal", f"{planner.goal_bias:.0%}, until it is reached"],
-        ["sampling", "uniform over the region, before and after the first path"],
+        [
+            "sampling",
+            "uniform over the region, before and after the first path; from 2,048 samples on "
+            "in batches of a quarter of those before, taken in the order in which they lie",
+        ],
         ["cost of a new vertex", "updated when its parent changes; Algorithm 3 leaves that out"],
         ["goal", "joins the tree as a vertex as soon as a step reaches it"],
         ["length that is reported", "true length under h of the path found, to 1e-9"],

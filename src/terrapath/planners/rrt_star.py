@@ -29,9 +29,9 @@ class RRTStar:
     seed : of the one random generator; the same seed gives the same tree, to the last bit.
     radius_factor : how many times the radius that optimality needs in theory.
     goal_bias : share of samples that are the goal, until it is reached.
-    informed : leave out samples that cannot improve the best path, by the chord bound
-        (Gammell et al. 2014), nor by the tree's own costs (Karaman et al. 2011); ``False``
-        samples all of the region, as in the paper.
+    informed : begin with the straight way; then leave out samples that cannot improve the
+        best path, by the chord bound (Gammell et al. 2014), and draw 0.3 of them around it
+        (Akgun and Stilman 2011). ``False`` samples all of the region, as in the paper.
     prune : leave out edges that the chord rules out; the tree is the same without.
     panel : longest stretch that one application of Line-R measures, map units; by default
         as long as the surface's features allow; ``math.inf`` is Algorithm 1 to the letter.
