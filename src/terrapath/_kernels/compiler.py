@@ -231,7 +231,15 @@ def _garbage_left() -> Iterator[None]:
     try:
         yield
     finally:
+        _call_old()
         gc.enable()
+
+
+def _call_old() -> None:
+    """Leave all objects to the next full collection, for the next small one would look at them."""
+    if not gc.get_freeze_count():  # else they would thaw that somebody froze
+        gc.freeze()
+        gc.unfreeze()
 
 
 class _PartCompiler(_LibraryCompiler):
