@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels import refinement as kernels
+from .._kernels import contacts as kernels
+from .._kernels.newton import Strand
 from ..surface import Surface
 from ..validation import Array
-from .newton import Lifted, descent_step, is_stationary, lift, lower
+from .newton import lift, lower
 from .walls import SLACK, Indices, Surroundings
 
 NONE = -1
@@ -159,13 +160,12 @@ def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices
 # Letting go
 
 
-def _forces(surface: Surface, path: Lifted) -> Array:
+def _forces(path: Strand) -> Array:
     """Minus the derivative of the length by each inner point, over the cost: (m - 2, 2)."""
     chords, costs = path.chords, np.sqrt(path.stiffness)
     sizes = np.linalg.norm(chords, axis=1)
     pulls = np.diff(costs[:, None] * chords / np.maximum(sizes, TINY)[:, None], axis=0)
-    weights = surface.data.weights[:, None]
-    slopes = path.jets[1:-1, :, 1:3] * weights
+    slopes = path.jets[1:-1, :, 1:3] * path.weights[:, None]
     shares = sizes / costs
     drift = 0.25 * (shares[1:] + shares[:-1])[:, None] * path.costs[1:-1, 1:3]
     force = pulls[:, :2] + np.einsum("mk,mka->ma", pulls[:, 2:], slopes) - drift
@@ -191,7 +191,7 @@ def loosened(
 
     releases : how often each corner was let go already; it is written to.
     """
-    force = _forces(surface, lift(surface, band.points))
+    force = _forces(lift(surface, band.points).strand)
     pull = (force * outwards(around, band)).sum(axis=1)
     along = _directions(band.points)
     turns_back = (along[1:] * along[:-1]).sum(axis=1) < TURNED_BACK
@@ -245,9 +245,7 @@ def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
     releases: dict[int, int] = {}
     for _ in range(MOST_ROUNDS):
         path = lift(surface, band.points)
-        step = descent_step(surface, path, projectors(around, band))
-        still = is_stationary(step, path)
-        found = None if still else lower(surface, path, step.move)
+        found = lower(surface, path, projectors(around, band))
         if found is None:
             shorter = _without_loops(band)
             if shorter is not band:

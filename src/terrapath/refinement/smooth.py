@@ -13,11 +13,12 @@ import math
 
 import numpy as np
 
+from .._kernels.newton import Strand
 from .._kernels.surfaces import fill_metric
 from ..surface import Surface
 from ..validation import Array
 from .curve import Curve, spline_through
-from .newton import Lifted, farthest_move, lift, newton_step
+from .newton import all_free, farthest_move, lift, newton_step
 
 FEWEST_PIECES = 7  # that the differences fit into
 MOST_CORRECTIONS = 12
@@ -47,14 +48,15 @@ def _differences(above: Array, central: Array, beside_end: Array, sign: float) -
     return found
 
 
-def _pull_and_drift(path: Lifted) -> tuple[Array, Array]:
-    """Those of the curve through the points: -(C s')' and |s'|^2 / 2 grad C, of fourth order."""
-    second = _differences(path.above, _CENTRAL, _BESIDE_END, 1.0)
-    first = _differences(path.above, _CENTRAL_SLOPE, _SLOPE_BESIDE_END, -1.0)
+def _of_fourth_order(path: Strand) -> Strand:
+    """With pull and drift those of the curve through the points, by fourth-order differences."""
+    above = np.hstack([path.points, path.jets[:, :, 0] * path.weights])
+    second = _differences(above, _CENTRAL, _BESIDE_END, 1.0)
+    first = _differences(above, _CENTRAL_SLOPE, _SLOPE_BESIDE_END, -1.0)
     cost, slope = path.costs[1:-1, :1], path.costs[1:-1, 1:3]
     along = (slope * first[:, :2]).sum(axis=1)[:, None]
     drift = 0.5 * np.square(first).sum(axis=1)[:, None] * slope
-    return -(cost * second + along * first), drift
+    return path._replace(pull=-(cost * second + along * first), drift=drift)
 
 
 def correct(surface: Surface, points: Array) -> Array | None:
@@ -65,13 +67,12 @@ def correct(surface: Surface, points: Array) -> Array | None:
     """
     if len(points) <= FEWEST_PIECES:
         return None
-    projectors = np.tile(np.eye(2), (len(points) - 2, 1, 1))
+    projectors = all_free(points)
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-    last = farthest_move(surface, points)
+    last = farthest_move(surface, length)
     points = points.copy()
     for _ in range(MOST_CORRECTIONS):
-        path = lift(surface, points)
-        step = newton_step(surface, path, *_pull_and_drift(path), projectors)
+        step = newton_step(_of_fourth_order(lift(surface, points).strand), projectors)
         size = float(np.abs(step.move).max())
         if not step.definite or not size < last:
             return None

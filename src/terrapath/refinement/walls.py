@@ -17,8 +17,8 @@ import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from .._kernels import contacts as kernels
 from .._kernels import free_space as grids
-from .._kernels import refinement as kernels
 from ..free_space import FreeSpace
 from ..surface import Mask
 from ..validation import Array, Bounds
