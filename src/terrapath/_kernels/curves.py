@@ -1,6 +1,29 @@
-"""Banded systems of linear equations."""
+"""Splines through points: B-splines on any knots, and their banded systems of equations."""
 
 from .compiler import kernel
+
+
+@kernel
+def fill_basis(knots, degree, shares, first, weights):
+    """The B-splines that are not 0 at shares (m,) of the way, between the outermost knots.
+
+    first (m,) : which is the first of them. weights (m, degree + 1) : their values.
+    """
+    for m in range(shares.shape[0]):
+        t, low, high = shares[m], degree, knots.shape[0] - degree - 1
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if t < knots[middle] else (middle, high)
+        first[m], weights[m, 0] = low - degree, 1.0
+        # Cox and de Boor: each of one degree is shared between two of the next.
+        for d in range(1, degree + 1):
+            carried = 0.0
+            for k in range(d):
+                left, right = knots[low - d + 1 + k], knots[low + 1 + k]
+                share = weights[m, k] / (right - left)
+                weights[m, k] = carried + (right - t) * share
+                carried = (t - left) * share
+            weights[m, d] = carried
 
 
 @kernel
