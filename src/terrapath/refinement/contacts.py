@@ -79,7 +79,8 @@ def subdivided(band: Band, longest: float) -> Band:
     at = np.repeat(np.arange(len(sizes)), cuts)
     if len(at) == 0:
         return band
-    within = np.concatenate([np.arange(1, n + 1) / (n + 1) for n in cuts if n])[:, None]
+    first = np.repeat(np.cumsum(cuts) - cuts, cuts)
+    within = ((np.arange(1, len(at) + 1) - first) / (cuts[at] + 1))[:, None]
     places = (1.0 - within) * band.points[at] + within * band.points[at + 1]
     finer = band.inserted(at + 1, places, NONE)
     # A piece along one wall stays on it.
@@ -111,8 +112,9 @@ def adopted(around: Surroundings, band: Band) -> Band:
 
 def projectors(around: Surroundings, band: Band) -> Array:
     """(m - 2, 2, 2), onto the moves that each inner point may make."""
-    allowed = np.tile(np.eye(2), (len(band.points), 1, 1))
-    sliding = band.walls[:, 0] != NONE
+    allowed = np.zeros((len(band.points), 2, 2))
+    allowed[:, 0, 0] = allowed[:, 1, 1] = 1.0
+    sliding = np.flatnonzero(band.walls[:, 0] != NONE)
     normals = around.walls.normals[band.walls[sliding, 0]]
     allowed[sliding] -= normals[:, :, None] * normals[:, None, :]
     allowed[band.is_held | (band.walls[:, 1] != NONE)] = 0.0
@@ -133,6 +135,8 @@ def advanced(around: Surroundings, band: Band, target: Array) -> tuple[Band, Ind
     hits = _stop_at_walls(around, band.points, moves)
     times, corners = np.empty(len(moves) - 1), np.empty(len(moves) - 1, np.int64)
     kernels.fill_corners(around.walls, band.points, moves, band.bends, times, corners)
+    if times.min() > 1.0 and (hits == NONE).all():
+        return replace(band, points=target), np.empty(0, np.int64)
     stretch = np.cumsum(band.is_held) - 1
     ends = np.full(stretch[-1] + 1, np.inf)
     np.minimum.at(ends, stretch[:-1], times)
@@ -229,6 +233,8 @@ def _without_loops(band: Band) -> Band:
 def _slid_off(around: Surroundings, band: Band) -> Band:
     """Points that slid beyond the end of their wall are free again."""
     touching = np.flatnonzero(band.walls[:, 0] != NONE)
+    if len(touching) == 0:
+        return band
     edges = around.walls.edges[band.walls[touching, 0]]
     along, offset = edges[:, 2:] - edges[:, :2], band.points[touching] - edges[:, :2]
     within = (along * offset).sum(axis=1) / (along**2).sum(axis=1)
@@ -243,8 +249,10 @@ def _slid_off(around: Surroundings, band: Band) -> Band:
 def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
     """The band pulled taut: no move of its points that obstacles leave them shortens it."""
     releases: dict[int, int] = {}
+    path = None
     for _ in range(MOST_ROUNDS):
-        path = lift(surface, band.points)
+        if path is None or path.points is not band.points:
+            path = lift(surface, band.points)
         found = lower(surface, path, projectors(around, band))
         if found is None:
             shorter = _without_loops(band)
@@ -257,5 +265,5 @@ def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
             band = looser
             continue
         band, _ = advanced(around, band, found.points)
-        band = _slid_off(around, band)
+        band, path = _slid_off(around, band), found
     return band

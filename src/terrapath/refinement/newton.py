@@ -36,7 +36,8 @@ class Lifted(NamedTuple):
     @property
     def points(self) -> Array:
         """(m, 2), map units."""
-        return np.asarray(self.strand.points)
+        points: Array = self.strand.points
+        return points
 
     @property
     def planar_length(self) -> float:
