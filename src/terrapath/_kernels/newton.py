@@ -1,4 +1,4 @@
-"""Newton's method for polylines of least energy.
+"""Newton's method for polylines of least energy: what lies above one, and its step.
 
 The energy of a polyline is its number of pieces times the sum of its squared chords in R^n,
 each times the mean of the squared cost C = c^2 at its ends. Least energy makes the pieces equally
@@ -268,30 +268,27 @@ def put_squared_cost(row, log):
 
 @kernel
 def fill_pieces(strand):
-    """What follows from the jets of the points and of the cost there."""
-    points, jets, chords, pull = strand.points, strand.jets, strand.chords, strand.pull
-    stiffness, costs = strand.stiffness, strand.costs
-    for m in range(chords.shape[0]):
+    """What follows from the jets of the points and of the cost there. Returns the energy.
+
+    That is the pieces' number times the sum of squared chords, each times its squared cost.
+    """
+    points, jets, chords, costs = strand.points, strand.jets, strand.chords, strand.costs
+    pieces, energy, squares = chords.shape[0], 0.0, 0.0
+    for m in range(pieces):
         chords[m, 0] = points[m + 1, 0] - points[m, 0]
         chords[m, 1] = points[m + 1, 1] - points[m, 1]
         for k in range(strand.weights.shape[0]):
             chords[m, k + 2] = strand.weights[k] * (jets[m + 1, k, 0] - jets[m, k, 0])
-        stiffness[m] = 0.5 * (costs[m, 0] + costs[m + 1, 0])
-    for i in range(pull.shape[0]):
-        for k in range(pull.shape[1]):
-            pull[i, k] = stiffness[i] * chords[i, k] - stiffness[i + 1] * chords[i + 1, k]
-        squares = squared_chord(strand, i) + squared_chord(strand, i + 1)
-        strand.drift[i, 0] = 0.25 * costs[i + 1, 1] * squares
-        strand.drift[i, 1] = 0.25 * costs[i + 1, 2] * squares
-
-
-@kernel
-def energy_of(strand):
-    """Pieces times the sum of their squared chords, each times its squared cost."""
-    pieces, total = strand.chords.shape[0], 0.0
-    for m in range(pieces):
-        total += strand.stiffness[m] * squared_chord(strand, m)
-    return pieces * total
+        strand.stiffness[m] = 0.5 * (costs[m, 0] + costs[m + 1, 0])
+        squares_before, squares = squares, squared_chord(strand, m)
+        energy += strand.stiffness[m] * squares
+        if m > 0:
+            both = 0.25 * (squares_before + squares)
+            strand.drift[m - 1, 0], strand.drift[m - 1, 1] = both * costs[m, 1], both * costs[m, 2]
+            for k in range(chords.shape[1]):
+                before = strand.stiffness[m - 1] * chords[m - 1, k]
+                strand.pull[m - 1, k] = before - strand.stiffness[m] * chords[m, k]
+    return pieces * energy
 
 
 @kernel
@@ -302,5 +299,4 @@ def lift(surface, strand):
         for layer in range(strand.weights.shape[0]):
             put_jet(strand.jets[m, layer], jet_at(surface, layer, x, y))
         put_squared_cost(strand.costs[m], log_cost_at(surface, x, y))
-    fill_pieces(strand)
-    return energy_of(strand)
+    return fill_pieces(strand)

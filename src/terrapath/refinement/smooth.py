@@ -14,7 +14,6 @@ import math
 import numpy as np
 
 from .._kernels.newton import Strand
-from .._kernels.surfaces import fill_metric
 from ..surface import Surface
 from ..validation import Array
 from .curve import Curve, spline_through
@@ -88,6 +87,15 @@ def curve_through(points: Array) -> Curve:
     return spline_through(points, 5 if len(points) > 6 else 3)
 
 
+def _measured(surface: Surface, points: Array, v: Array) -> tuple[Array, Array]:
+    """|v|_h and det h (m,) at points (m, 2), by the kernel that refinement needs in any case."""
+    path = lift(surface, points).strand
+    slopes = path.jets[:, :, 1:3] * path.weights[:, None]
+    h = path.costs[:, 0, None, None] * (np.eye(2) + np.einsum("mka,mkb->mab", slopes, slopes))
+    determinant = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] ** 2
+    return np.sqrt(np.einsum("ma,mab,mb->m", v, h, v)), determinant
+
+
 def laid_shares(surface: Surface, curve: Curve, pieces: int, tolerance: float) -> Array:
     """Shares of the way at which the points of a polyline are to be laid, both ends included.
 
@@ -96,11 +104,8 @@ def laid_shares(surface: Surface, curve: Curve, pieces: int, tolerance: float) -
     u being its direction. pieces : of the curve, which are sampled to find out.
     """
     t = np.linspace(0.0, 1.0, SAMPLES_PER_PIECE * pieces + 1)
-    places, v, bend = curve(t), curve(t, 1), curve(t, 2)
-    h = np.empty((len(t), 2, 2))
-    fill_metric(surface.data, np.ascontiguousarray(places), h)
-    speed = np.sqrt(np.einsum("ma,mab,mb->m", v, h, v))
-    determinant = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] ** 2
+    v, bend = curve(t, 1), curve(t, 2)
+    speed, determinant = _measured(surface, curve(t), v)
     turning = v[:, 0] * bend[:, 1] - v[:, 1] * bend[:, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         density = np.cbrt(np.nan_to_num(determinant * turning**2 / (24.0 * speed**3)))
