@@ -15,8 +15,8 @@ from .validation import Array, as_points
 # Relative tolerance of a true length; what is promised is 1e-9.
 QUADRATURE_TOLERANCE = 1e-12
 
-# The 15-point rule is first laid over pieces this many features of the surface long.
-FEATURES_PER_PIECE = 8.0
+# The 7-point rule is first laid over pieces this many features of the surface long.
+FEATURES_PER_PIECE = 4.0
 
 
 def metric_tensor(surface: Surface, points: Any) -> Array:

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from .compiler import allocating_kernel, inner_kernel, kernel
-from .four import four, sqrt, total
-from .surfaces import floor_of, speed_at, speeds_inside, spot_at, value_at
+from .compiler import inner_kernel, kernel
+from .four import four, four_in_row, sqrt, total
+from .surfaces import floor_of, speed_at, speeds_along, speeds_inside, spot_at, value_at
 
 
 @inner_kernel
@@ -54,97 +54,76 @@ def chord(surface, ax, ay, bx, by):
     return floor_of(surface) * math.sqrt(total)
 
 
-def _symmetric(half, sign):
-    """The 15 entries of a symmetric (or antisymmetric) rule from its first 8."""
-    return np.concatenate([half, sign * np.array(half[-2::-1])])
-
-
-# Gauss-Kronrod nodes on [-1, 1] with the 15-point weights, and the 7-point weights of
-# every other node (QUADPACK, Piessens et al. 1983).
-_NODES = _symmetric(
-    [
-        -0.991455371120812639206854697526329,
-        -0.949107912342758524526189684047851,
-        -0.864864423359769072789712788640926,
-        -0.741531185599394439863864773280788,
-        -0.586087235467691130294144691693270,
-        -0.405845151377397166906606412076961,
-        -0.207784955007898467600689403773245,
-        0.0,
-    ],
-    -1.0,
-)
-_KRONROD = _symmetric(
-    [
-        0.022935322010529224963732008058970,
-        0.063092092629978553290700663189204,
-        0.104790010322250183839876322541518,
-        0.140653259715525918745189590510238,
-        0.169004726639267902826583426598550,
-        0.190350578064785409913256402421014,
-        0.204432940075298892414161999234649,
-        0.209482141084727828012999174891714,
-    ],
-    1.0,
-)
-_GAUSS = _symmetric(
-    [
-        0.0,
-        0.129484966168869693270611432679082,
-        0.0,
-        0.279705391489276667901467771423780,
-        0.0,
-        0.381830050505118944950369775488975,
-        0.0,
-        0.417959183673469387755102040816327,
-    ],
-    1.0,
-)
+# Patterson's nested rules on [-1, 1] (1968) with 3, 7 and 15 points, exact for degrees 5, 11
+# and 23. Each keeps the nodes of the one before, so that short segments take seven and others
+# lose nothing. Here is the lower half of the nodes and half of the one in the middle.
+_NODES = [
+    *(-0.960491268708020283423507092629, -0.774596669241483377035853079956),
+    *(-0.434243749346802558002071502845, 0.0),
+    *(-0.993831963212755022208512841308, -0.888459232872256998890420167259),
+    *(-0.621102946737226402940687443817, -0.223386686428966881628203986844),
+]
+_THREE = [0.0, 5.0 / 9.0, 0.0, 0.5 * 8.0 / 9.0, 0.0, 0.0, 0.0, 0.0]
+_SEVEN = [
+    *(0.104656226026467265193823857192, 0.268488089868333440728569280667),
+    *(0.401397414775962222905051818618, 0.5 * 0.450916538658474142345110087046),
+    *(0.0, 0.0, 0.0, 0.0),
+]
+_FIFTEEN = [
+    *(0.051603282997079739696920120568, 0.134415255243784220359968764802),
+    *(0.200628529376989021033931873331, 0.5 * 0.225510499798206687386422549156),
+    *(0.017001719629940260339027417403, 0.092927195315124537685894226654),
+    *(0.171511909136391380787353165020, 0.219156858401587496403693161644),
+]
+_RULES = np.array([_NODES, _THREE, _SEVEN, _FIFTEEN]).reshape(4, 2, 4)
 
 
 @kernel
-def gauss_kronrod(surface, ax, ay, dx, dy, low, high):
-    """The integral of |v|_h over t in [low, high] for r(t) = a + t v, and its error estimate."""
-    centre, half = 0.5 * (low + high), 0.5 * (high - low)
-    kronrod, gauss = 0.0, 0.0
-    for k in range(15):
-        t = centre + half * _NODES[k]
-        s = speed_at(surface, ax + t * dx, ay + t * dy, dx, dy)
-        kronrod += _KRONROD[k] * s
-        gauss += _GAUSS[k] * s
-    return half * kronrod, abs(half * (kronrod - gauss))
+def integral(surface, x, y, vx, vy, tolerance):
+    """The integral of |v|_h from (x, y) - v to (x, y) + v and an estimate of its error.
 
-
-# The shortest piece that is halved no more: far below any feature of a surface.
-_LEVELS = 40
-_SHORTEST = 0.5**_LEVELS
-
-
-@allocating_kernel
-def piece_length(surface, ax, ay, dx, dy, low, high, tolerance):
-    """The integral of |v|_h over t in [low, high] by adaptive bisection.
-
-    Pieces are halved until each one's error estimate is under ``tolerance`` times the
-    whole. The estimate is that of the 7-point rule, so the 15-point value that is summed
-    is better still.
+    The estimate is that of the rule before, so the value is better still. Seven points that
+    are right to the tolerance, relative, are enough.
     """
-    pending = np.empty(_LEVELS + 1)
-    shortest = _SHORTEST * (high - low)
-    depth, total = 0, 0.0
-    value, error = gauss_kronrod(surface, ax, ay, dx, dy, low, high)
-    allowed = tolerance * value
-    while True:
-        if not error > allowed or high - low <= shortest:
-            total += value
-            if depth == 0:
-                return total
-            depth -= 1
-            low, high = high, pending[depth]
-        else:
-            pending[depth] = high
-            depth += 1
-            high = 0.5 * (low + high)
-        value, error = gauss_kronrod(surface, ax, ay, dx, dy, low, high)
+    three, seven, fifteen = 0.0, 0.0, 0.0
+    for k in range(2):
+        if k == 1 and abs(seven - three) <= tolerance * seven:
+            return seven, 0.0
+        nodes = four_in_row(_RULES, 0, k, 0)
+        below = speeds_along(surface, x, y, vx, vy, nodes)
+        speeds = below + speeds_along(surface, x, y, vx, vy, -1.0 * nodes)
+        three += total(four_in_row(_RULES, 1, k, 0) * speeds)
+        seven += total(four_in_row(_RULES, 2, k, 0) * speeds)
+        fifteen += total(four_in_row(_RULES, 3, k, 0) * speeds)
+    return fifteen, abs(fifteen - seven)
+
+
+# A piece that is halved no more: far below any feature of a surface.
+_MOST_PIECES = 2**40
+
+
+@kernel
+def piece_length(surface, x, y, vx, vy, tolerance):
+    """The integral of |v|_h from (x, y) on by v, by adaptive bisection.
+
+    Pieces are halved until each one's error estimate is under ``tolerance`` times the whole.
+    """
+    length, allowed = 0.0, 0.0
+    k, pieces = 0, 1  # the k-th of so many equal ones is next
+    while k < pieces:
+        share = 0.5 / pieces
+        middle, wx, wy = (2 * k + 1) * share, share * vx, share * vy
+        value, error = integral(surface, x + middle * vx, y + middle * vy, wx, wy, tolerance)
+        if pieces == 1:
+            allowed = tolerance * value
+        if error > allowed and pieces < _MOST_PIECES:
+            k, pieces = 2 * k, 2 * pieces
+            continue
+        length += value
+        k += 1
+        while k % 2 == 0 and pieces > 1:  # both halves are done
+            k, pieces = k // 2, pieces // 2
+    return length
 
 
 @kernel
@@ -154,13 +133,12 @@ def segment_length(surface, ax, ay, bx, by, longest, tolerance):
     It is cut into pieces of at most ``longest`` on the plane, few enough of the surface's
     features long that no feature falls between the nodes of the first rule unseen.
     """
-    dx, dy = bx - ax, by - ay
-    pieces = max(math.ceil(math.hypot(dx, dy) / longest), 1)
-    total = 0.0
+    pieces = max(math.ceil(math.hypot(bx - ax, by - ay) / longest), 1)
+    dx, dy = (bx - ax) / pieces, (by - ay) / pieces
+    length = 0.0
     for k in range(pieces):
-        low, high = k / pieces, (k + 1) / pieces
-        total += piece_length(surface, ax, ay, dx, dy, low, high, tolerance)
-    return total
+        length += piece_length(surface, ax + k * dx, ay + k * dy, dx, dy, tolerance)
+    return length
 
 
 # Many segments at once

@@ -305,9 +305,28 @@ def speed_at(surface, x, y, vx, vy):
 
 
 @inner_kernel
+def peaks_speeds_along(surface, x, y, vx, vy, shares):
+    return speed_at(surface, fused(shares, vx, x), fused(shares, vy, y), vx, vy)
+
+
+@inner_kernel
+def spline_speeds_along(surface, x, y, vx, vy, shares):
+    return four(
+        speed_at(surface, x + shares[0] * vx, y + shares[0] * vy, vx, vy),
+        speed_at(surface, x + shares[1] * vx, y + shares[1] * vy, vx, vy),
+        speed_at(surface, x + shares[2] * vx, y + shares[2] * vy, vx, vy),
+        speed_at(surface, x + shares[3] * vx, y + shares[3] * vy, vx, vy),
+    )
+
+
+@per_class({Peaks: peaks_speeds_along, Spline: spline_speeds_along})
+def speeds_along(surface, x, y, vx, vy, shares):
+    """|v|_h at four shares of the way from (x, y) on by v."""
+
+
+@inner_kernel
 def peaks_speeds_inside(surface, x, y, vx, vy):
-    quarters = four(0.25, 0.5, 0.75, 1.0)
-    return speed_at(surface, fused(quarters, vx, x), fused(quarters, vy, y), vx, vy)
+    return peaks_speeds_along(surface, x, y, vx, vy, four(0.25, 0.5, 0.75, 1.0))
 
 
 @inner_kernel

@@ -15,15 +15,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels import refinement as kernels
+from .._kernels import contacts as kernels
+from .._kernels.newton import Strand
 from ..surface import Surface
 from ..validation import Array
-from .newton import Lifted, descent_step, is_stationary, lift, lower
+from .newton import lift, lower
 from .walls import SLACK, Indices, Surroundings
 
 NONE = -1
 MOST_ROUNDS = 1500
-MOST_RELEASES = 8  # of one corner
+# Of one corner. The last piece before a disc is long, and the way it points is off by so much
+# that the corner seems to pull; it is met again as soon as it is let go.
+MOST_RELEASES = 3
 # Radians that a path turns by at a contact that pulls, before it is let go.
 LEAST_PULL = 1e-6
 # A taut path turns by a right angle at most where it bends round a corner: this is the cosine
@@ -78,7 +81,8 @@ def subdivided(band: Band, longest: float) -> Band:
     at = np.repeat(np.arange(len(sizes)), cuts)
     if len(at) == 0:
         return band
-    within = np.concatenate([np.arange(1, n + 1) / (n + 1) for n in cuts if n])[:, None]
+    first = np.repeat(np.cumsum(cuts) - cuts, cuts)
+    within = ((np.arange(1, len(at) + 1) - first) / (cuts[at] + 1))[:, None]
     places = (1.0 - within) * band.points[at] + within * band.points[at + 1]
     finer = band.inserted(at + 1, places, NONE)
     # A piece along one wall stays on it.
@@ -110,8 +114,9 @@ def adopted(around: Surroundings, band: Band) -> Band:
 
 def projectors(around: Surroundings, band: Band) -> Array:
     """(m - 2, 2, 2), onto the moves that each inner point may make."""
-    allowed = np.tile(np.eye(2), (len(band.points), 1, 1))
-    sliding = band.walls[:, 0] != NONE
+    allowed = np.zeros((len(band.points), 2, 2))
+    allowed[:, 0, 0] = allowed[:, 1, 1] = 1.0
+    sliding = np.flatnonzero(band.walls[:, 0] != NONE)
     normals = around.walls.normals[band.walls[sliding, 0]]
     allowed[sliding] -= normals[:, :, None] * normals[:, None, :]
     allowed[band.is_held | (band.walls[:, 1] != NONE)] = 0.0
@@ -132,6 +137,8 @@ def advanced(around: Surroundings, band: Band, target: Array) -> tuple[Band, Ind
     hits = _stop_at_walls(around, band.points, moves)
     times, corners = np.empty(len(moves) - 1), np.empty(len(moves) - 1, np.int64)
     kernels.fill_corners(around.walls, band.points, moves, band.bends, times, corners)
+    if times.min() > 1.0 and (hits == NONE).all():
+        return replace(band, points=target), np.empty(0, np.int64)
     stretch = np.cumsum(band.is_held) - 1
     ends = np.full(stretch[-1] + 1, np.inf)
     np.minimum.at(ends, stretch[:-1], times)
@@ -159,13 +166,12 @@ def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices
 # Letting go
 
 
-def _forces(surface: Surface, path: Lifted) -> Array:
+def _forces(path: Strand) -> Array:
     """Minus the derivative of the length by each inner point, over the cost: (m - 2, 2)."""
     chords, costs = path.chords, np.sqrt(path.stiffness)
     sizes = np.linalg.norm(chords, axis=1)
     pulls = np.diff(costs[:, None] * chords / np.maximum(sizes, TINY)[:, None], axis=0)
-    weights = surface.data.weights[:, None]
-    slopes = path.jets[1:-1, :, 1:3] * weights
+    slopes = path.jets[1:-1, :, 1:3] * path.weights[:, None]
     shares = sizes / costs
     drift = 0.25 * (shares[1:] + shares[:-1])[:, None] * path.costs[1:-1, 1:3]
     force = pulls[:, :2] + np.einsum("mk,mka->ma", pulls[:, 2:], slopes) - drift
@@ -185,13 +191,13 @@ def outwards(around: Surroundings, band: Band) -> Array:
 
 
 def loosened(
-    surface: Surface, around: Surroundings, band: Band, releases: dict[int, int]
+    around: Surroundings, band: Band, path: Strand, releases: dict[int, int]
 ) -> Band | None:
     """Without the contacts that pull at the path; None where there is none of them.
 
-    releases : how often each corner was let go already; it is written to.
+    path : the band, lifted. releases : how often each corner was let go already; it is written to.
     """
-    force = _forces(surface, lift(surface, band.points))
+    force = _forces(path)
     pull = (force * outwards(around, band)).sum(axis=1)
     along = _directions(band.points)
     turns_back = (along[1:] * along[:-1]).sum(axis=1) < TURNED_BACK
@@ -229,6 +235,8 @@ def _without_loops(band: Band) -> Band:
 def _slid_off(around: Surroundings, band: Band) -> Band:
     """Points that slid beyond the end of their wall are free again."""
     touching = np.flatnonzero(band.walls[:, 0] != NONE)
+    if len(touching) == 0:
+        return band
     edges = around.walls.edges[band.walls[touching, 0]]
     along, offset = edges[:, 2:] - edges[:, :2], band.points[touching] - edges[:, :2]
     within = (along * offset).sum(axis=1) / (along**2).sum(axis=1)
@@ -243,21 +251,21 @@ def _slid_off(around: Surroundings, band: Band) -> Band:
 def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
     """The band pulled taut: no move of its points that obstacles leave them shortens it."""
     releases: dict[int, int] = {}
+    path = None
     for _ in range(MOST_ROUNDS):
-        path = lift(surface, band.points)
-        step = descent_step(surface, path, projectors(around, band))
-        still = is_stationary(step, path)
-        found = None if still else lower(surface, path, step.move)
+        if path is None or path.points is not band.points:
+            path = lift(surface, band.points)
+        found = lower(surface, path, projectors(around, band))
         if found is None:
             shorter = _without_loops(band)
             if shorter is not band:
                 band = shorter
                 continue
-            looser = loosened(surface, around, band, releases)
+            looser = loosened(around, band, path.strand, releases)
             if looser is None:
                 break
             band = looser
             continue
         band, _ = advanced(around, band, found.points)
-        band = _slid_off(around, band)
+        band, path = _slid_off(around, band), found
     return band

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .._kernels.banded import solve_banded
+from .._kernels.curves import fill_basis, solve_banded
 from ..validation import Array
 
 
@@ -30,8 +30,8 @@ class Curve:
         if derivative:
             return self._slope()(shares, derivative - 1)
         first, weights = _basis(self.knots, self.degree, shares)
-        parts = (w[:, None] * self.coefficients[first + k] for k, w in enumerate(weights))
-        return np.asarray(sum(parts))
+        nearby = self.coefficients.take(first[:, None] + np.arange(self.degree + 1), axis=0)
+        return np.asarray(np.einsum("mk,mka->ma", weights, nearby))
 
     def _slope(self) -> Curve:
         k, knots = self.degree, self.knots
@@ -39,21 +39,11 @@ class Curve:
         return Curve(k - 1, knots[1:-1], k * np.diff(self.coefficients, axis=0) / spans)
 
 
-def _basis(knots: Array, degree: int, shares: Array) -> tuple[NDArray[np.intp], list[Array]]:
+def _basis(knots: Array, degree: int, shares: Array) -> tuple[NDArray[np.int64], Array]:
     """The first of the B-splines that are not 0 at each share, and the values of all of them."""
-    last = len(knots) - degree - 2
-    piece = np.clip(np.searchsorted(knots, shares, side="right") - 1, degree, last)
-    weights = [np.ones(len(shares))]
-    # Cox and de Boor: each of one degree is shared between two of the next.
-    for d in range(1, degree + 1):
-        raised = [np.zeros(len(shares)) for _ in range(d + 1)]
-        for k, weight in enumerate(weights):
-            left, right = knots[piece - d + 1 + k], knots[piece + 1 + k]
-            share = weight / (right - left)
-            raised[k] += (right - shares) * share
-            raised[k + 1] += (shares - left) * share
-        weights = raised
-    return piece - degree, weights
+    first, weights = np.empty(len(shares), np.int64), np.empty((len(shares), degree + 1))
+    fill_basis(knots, degree, shares, first, weights)
+    return first, weights
 
 
 def spline_through(points: Array, degree: int) -> Curve:
@@ -70,7 +60,7 @@ def spline_through(points: Array, degree: int) -> Curve:
     knots = np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)])
     first, weights = _basis(knots, degree, shares)
     rows, coefficients = np.zeros((len(points), 2 * degree + 1)), np.array(points)
-    for k, weight in enumerate(weights):
-        rows[np.arange(len(points)), degree + first + k - np.arange(len(points))] = weight
+    row = np.arange(len(points))[:, None]
+    rows[row, degree + first[:, None] + np.arange(degree + 1) - row] = weights
     solve_banded(rows, coefficients)
     return Curve(degree, knots, coefficients)

@@ -13,11 +13,11 @@ import math
 
 import numpy as np
 
-from .._kernels.surfaces import fill_metric
+from .._kernels.newton import Strand
 from ..surface import Surface
 from ..validation import Array
 from .curve import Curve, spline_through
-from .newton import Lifted, farthest_move, lift, newton_step
+from .newton import all_free, farthest_move, lift, newton_step
 
 FEWEST_PIECES = 7  # that the differences fit into
 MOST_CORRECTIONS = 12
@@ -47,14 +47,15 @@ def _differences(above: Array, central: Array, beside_end: Array, sign: float) -
     return found
 
 
-def _pull_and_drift(path: Lifted) -> tuple[Array, Array]:
-    """Those of the curve through the points: -(C s')' and |s'|^2 / 2 grad C, of fourth order."""
-    second = _differences(path.above, _CENTRAL, _BESIDE_END, 1.0)
-    first = _differences(path.above, _CENTRAL_SLOPE, _SLOPE_BESIDE_END, -1.0)
+def _of_fourth_order(path: Strand) -> Strand:
+    """With pull and drift those of the curve through the points, by fourth-order differences."""
+    above = np.hstack([path.points, path.jets[:, :, 0] * path.weights])
+    second = _differences(above, _CENTRAL, _BESIDE_END, 1.0)
+    first = _differences(above, _CENTRAL_SLOPE, _SLOPE_BESIDE_END, -1.0)
     cost, slope = path.costs[1:-1, :1], path.costs[1:-1, 1:3]
     along = (slope * first[:, :2]).sum(axis=1)[:, None]
     drift = 0.5 * np.square(first).sum(axis=1)[:, None] * slope
-    return -(cost * second + along * first), drift
+    return path._replace(pull=-(cost * second + along * first), drift=drift)
 
 
 def correct(surface: Surface, points: Array) -> Array | None:
@@ -65,13 +66,12 @@ def correct(surface: Surface, points: Array) -> Array | None:
     """
     if len(points) <= FEWEST_PIECES:
         return None
-    projectors = np.tile(np.eye(2), (len(points) - 2, 1, 1))
+    projectors = all_free(points)
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-    last = farthest_move(surface, points)
+    last = farthest_move(surface, length)
     points = points.copy()
     for _ in range(MOST_CORRECTIONS):
-        path = lift(surface, points)
-        step = newton_step(surface, path, *_pull_and_drift(path), projectors)
+        step = newton_step(_of_fourth_order(lift(surface, points).strand), projectors)
         size = float(np.abs(step.move).max())
         if not step.definite or not size < last:
             return None
@@ -87,6 +87,15 @@ def curve_through(points: Array) -> Curve:
     return spline_through(points, 5 if len(points) > 6 else 3)
 
 
+def _measured(surface: Surface, points: Array, v: Array) -> tuple[Array, Array]:
+    """|v|_h and det h (m,) at points (m, 2), by the kernel that refinement needs in any case."""
+    path = lift(surface, points).strand
+    slopes = path.jets[:, :, 1:3] * path.weights[:, None]
+    h = path.costs[:, 0, None, None] * (np.eye(2) + np.einsum("mka,mkb->mab", slopes, slopes))
+    determinant = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] ** 2
+    return np.sqrt(np.einsum("ma,mab,mb->m", v, h, v)), determinant
+
+
 def laid_shares(surface: Surface, curve: Curve, pieces: int, tolerance: float) -> Array:
     """Shares of the way at which the points of a polyline are to be laid, both ends included.
 
@@ -95,11 +104,8 @@ def laid_shares(surface: Surface, curve: Curve, pieces: int, tolerance: float) -
     u being its direction. pieces : of the curve, which are sampled to find out.
     """
     t = np.linspace(0.0, 1.0, SAMPLES_PER_PIECE * pieces + 1)
-    places, v, bend = curve(t), curve(t, 1), curve(t, 2)
-    h = np.empty((len(t), 2, 2))
-    fill_metric(surface.data, np.ascontiguousarray(places), h)
-    speed = np.sqrt(np.einsum("ma,mab,mb->m", v, h, v))
-    determinant = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] ** 2
+    v, bend = curve(t, 1), curve(t, 2)
+    speed, determinant = _measured(surface, curve(t), v)
     turning = v[:, 0] * bend[:, 1] - v[:, 1] * bend[:, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
         density = np.cbrt(np.nan_to_num(determinant * turning**2 / (24.0 * speed**3)))

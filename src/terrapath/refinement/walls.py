@@ -17,8 +17,8 @@ import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from .._kernels import contacts as kernels
 from .._kernels import free_space as grids
-from .._kernels import refinement as kernels
 from ..free_space import FreeSpace
 from ..surface import Mask
 from ..validation import Array, Bounds
@@ -137,30 +137,27 @@ def _mask(mask: Mask, clearance: float) -> Outline:
     blocked = np.pad(mask.blocked, 1)
     node_x = mask.x[0] - 0.5 * dx + dx * np.arange(mask.blocked.shape[1] + 1)
     node_y = mask.y[0] - 0.5 * dy + dy * np.arange(mask.blocked.shape[0] + 1)
-    quarters = np.stack(
-        [blocked[:-1, :-1], blocked[:-1, 1:], blocked[1:, :-1], blocked[1:, 1:]], axis=-1
-    )
-    is_corner = quarters.sum(axis=-1) == 1
+    quarters = (blocked[:-1, :-1], blocked[:-1, 1:], blocked[1:, :-1], blocked[1:, 1:])
+    is_corner = np.asarray(sum(quarter.view(np.uint8) for quarter in quarters)) == 1
     outward = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
     j, i = np.nonzero(is_corner)
-    outwards = outward[quarters[j, i].argmax(axis=-1)]
+    outwards = outward[np.argmax([quarter[j, i] for quarter in quarters], axis=0)]
     corners = np.column_stack([node_x[i], node_y[j]])
-    nodes = np.stack(np.meshgrid(node_x, node_y), axis=-1)
     edges, normals = [], []
-    for below, above, first, last, normal in (
+    for below, above, step, normal in (
         # Walls along x1 with free ground above or below, then along x2 to the right or left.
-        (blocked[:-1, 1:-1], blocked[1:, 1:-1], nodes[:, :-1], nodes[:, 1:], (0.0, 1.0)),
-        (blocked[1:-1, :-1], blocked[1:-1, 1:], nodes[:-1], nodes[1:], (1.0, 0.0)),
+        (blocked[:-1, 1:-1], blocked[1:, 1:-1], (0, 1), (0.0, 1.0)),
+        (blocked[1:-1, :-1], blocked[1:-1, 1:], (1, 0), (1.0, 0.0)),
     ):
-        ends = (is_corner[:, :-1], is_corner[:, 1:]), (is_corner[:-1], is_corner[1:])
-        bends = ends[0] if normal[1] else ends[1]
         for walls, way in ((below & ~above, 1.0), (above & ~below, -1.0)):
-            a, b = first[walls], last[walls]
+            j, i = np.nonzero(walls)
+            first, last = (j, i), (j + step[0], i + step[1])
+            a, b = (np.column_stack([node_x[i], node_y[j]]) for j, i in (first, last))
             along = (b - a) / np.hypot(*(b - a).T)[:, None]
             longer = SHORTENED * clearance * along
             out = way * np.array(normal)
-            a = a + (1.0 - SLACK) * clearance * out - bends[0][walls][:, None] * longer
-            b = b + (1.0 - SLACK) * clearance * out + bends[1][walls][:, None] * longer
+            a = a + (1.0 - SLACK) * clearance * out - is_corner[first][:, None] * longer
+            b = b + (1.0 - SLACK) * clearance * out + is_corner[last][:, None] * longer
             edges.append(np.hstack([a, b]))
             normals.append(np.broadcast_to(out, a.shape))
     joined = np.concatenate(edges)
