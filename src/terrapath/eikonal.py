@@ -70,7 +70,9 @@ class Medium:
 
     def shrink(self, factors: Array) -> None:
         """Multiply lengths at the nodes by factors (ny, nx), for good."""
-        stencils.shrink_metric(self.nodes, np.ascontiguousarray(factors, np.float64).ravel())
+        scale = 1.0 / np.square(np.asarray(factors, np.float64).ravel())
+        for rho in ("rho0", "rho1", "rho2"):
+            self.nodes[rho] *= scale
 
     @classmethod
     def of_tensors(cls, tensors: Any, lattice: Lattice) -> Medium:
@@ -83,10 +85,14 @@ class Medium:
         return cls(lattice, nodes)
 
     def _readers(self) -> readers.Readers:
-        first = np.zeros(len(self.nodes) + 1, np.int32)
-        readers.count_readers(self.nodes, self.lattice.nx, first)
+        nx, first = self.lattice.nx, np.zeros(len(self.nodes) + 1, np.int32)
+        # Each node's readers are counted in the place after its own, and become their places.
+        readers.note_readers(self.nodes, nx, first[1:], np.empty(0, np.uint32))
+        np.cumsum(first, dtype=np.int32, out=first)
         entries = np.empty(first[-1], np.uint32)
-        readers.list_readers(self.nodes, self.lattice.nx, first, entries)
+        readers.note_readers(self.nodes, nx, first, entries)
+        first[1:] = first[:-1]  # each was moved to its end, where the next begins
+        first[0] = 0
         return readers.Readers(first, entries)
 
     def march(

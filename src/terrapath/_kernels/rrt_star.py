@@ -32,6 +32,7 @@ from .tree import (
     edge_length,
     pass_on_cost,
     place,
+    plant,
     release,
     renumber,
     squared_rise,
@@ -237,7 +238,12 @@ def join_goal(surface, space, tree, options):
 
 @kernel
 def grow(surface, space, tree, options, draws):
-    """Algorithm 2: draw len(draws) samples. draws (m, 3): uniform numbers in [0, 1)."""
+    """Algorithm 2: draw len(draws) samples. draws (m, 3): uniform numbers in [0, 1).
+
+    The first call plants the tree.
+    """
+    if tree.counters[VERTICES] == 0:
+        plant(surface, tree, options)
     for m in range(draws.shape[0]):
         tree.counters[SAMPLES] += 1
         x, y, worthwhile = sample(surface, tree, options, draws[m])

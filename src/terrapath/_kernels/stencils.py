@@ -287,16 +287,6 @@ def block_nodes(grid, blocked, nodes):
         node.around = edges
 
 
-@kernel
-def shrink_metric(nodes, factors):
-    """Multiply all lengths at each node by a factor (n,)."""
-    for n in range(nodes.shape[0]):
-        scale = 1.0 / (factors[n] * factors[n])
-        nodes[n].rho0 *= scale
-        nodes[n].rho1 *= scale
-        nodes[n].rho2 *= scale
-
-
 @inner_kernel
 def length_at(node, e):
     """Length of a lattice vector e under the metric of a node.

@@ -64,7 +64,7 @@ class Tree(NamedTuple):
 
     places: np.ndarray  # (n, LIFTED + layers) float64: rows of X, Y, COST and LIFTED
     vertices: np.ndarray  # (n,) VERTEX
-    counters: np.ndarray  # (COUNTERS,) int64
+    counters: np.ndarray  # (COUNTERS,) int64, 0 before the tree is planted
     buckets: Buckets
     floor: float  # no cost of the surface is below it
     near: np.ndarray  # (n,) CANDIDATE: workspace
@@ -78,6 +78,8 @@ class Options(NamedTuple):
     y0: float
     x1: float
     y1: float
+    start_x: float
+    start_y: float
     goal_x: float
     goal_y: float
     step: float
@@ -143,9 +145,9 @@ def place(surface, tree, new, x, y):
 
 
 @kernel
-def plant(surface, tree, options, x, y):
-    """Start the tree with one vertex."""
-    place(surface, tree, 0, x, y)
+def plant(surface, tree, options):
+    """Make the start the tree's first vertex."""
+    place(surface, tree, 0, options.start_x, options.start_y)
     tree.places[0, COST] = 0.0
     root = tree.vertices[0]
     root.edge = 0.0
@@ -153,7 +155,6 @@ def plant(surface, tree, options, x, y):
     root.sibling = -1
     tree.buckets.frame[0] = options.x0
     tree.buckets.frame[1] = options.y0
-    tree.counters[:] = 0
     tree.counters[GOAL] = -1
     tree.counters[VERTICES] = 1
     tree.counters[STRAIGHT] = options.informed

@@ -63,6 +63,7 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     panel = options.panel or FEATURES_PER_PANEL * problem.surface.resolution
     return trees.Options(
         *bounds,
+        *problem.start,
         *problem.goal,
         step=float(options.step or default_step(problem)),
         radius=float(options.radius_factor * least),
@@ -136,7 +137,6 @@ class _Search:
 def _prepare(problem: Problem, tree: trees.Tree, settings: trees.Options) -> None:
     """Plant the tree, and have the kernels loaded, or compiled, before the clock starts."""
     surface, space = problem.surface.data, problem.free_space.data
-    trees.plant(surface, tree, settings, *problem.start)
     kernels.grow(surface, space, tree, settings, np.empty((0, 3)))
 
 

@@ -344,8 +344,9 @@ class Surface:
     def log_cost_jets(self, points: Any) -> Array:
         """Points (..., 2) -> (..., 6): log of the cost, d/dx1, d/dx2, and second derivatives."""
         flat, shape = self._points(points)
-        jets = np.empty((len(flat), 6))
-        fill_log_costs(self.data, flat, jets)
+        jets = np.zeros((len(flat), 6))
+        if self.cost_data is not None:
+            fill_log_costs(self.data, flat, jets)
         return jets.reshape(*shape, 6)
 
     def cost_values(self, points: Any) -> Array:
