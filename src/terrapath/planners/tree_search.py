@@ -174,12 +174,14 @@ def _chunks(seed: int, samples: int) -> Iterator[Array]:
     make the beginning of the tree that more make, whatever the chunks.
     """
     random = np.random.Generator(np.random.PCG64(seed))
-    batch = random.random((UNORDERED, 3))
+    batch = random.random((min(UNORDERED, samples), 3))
     drawn = 0
-    while drawn < samples:
+    while True:
         used = batch[: samples - drawn]
         yield from (used[first : first + CHUNK] for first in range(0, len(used), CHUNK))
         drawn += len(batch)
+        if drawn >= samples:
+            return
         batch = _side_by_side(random.random((drawn // 4, 3)))
 
 
@@ -201,21 +203,22 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
     vertex = int(tree.counters[trees.GOAL])
     if vertex < 0:
         return None
-    way = []
+    way, parents = [], tree.vertices["parent"]
     while vertex >= 0:
         way.append(vertex)
-        vertex = int(tree.vertices[vertex]["parent"])
+        vertex = int(parents[vertex])
     return problem.path(tree.places[way[::-1], : trees.COST])
 
 
 def _search_tree(tree: trees.Tree) -> SearchTree:
     """The vertices in the order in which they came."""
-    vertices = tree.vertices[: tree.counters[trees.VERTICES]]
-    by_age = np.argsort(vertices["age"])
-    ages = np.append(vertices["age"], np.int32(-1))  # what the start's parent, -1, stands for
+    count = int(tree.counters[trees.VERTICES])
+    ages, parents = tree.vertices["age"][:count], tree.vertices["parent"][:count]
+    by_age = np.argsort(ages)
+    known = np.append(ages, np.int32(-1))  # what the start's parent, -1, stands for
     return SearchTree(
         points=tree.places[by_age, : trees.COST],
-        parents=ages[vertices["parent"][by_age]],
+        parents=known[parents[by_age]],
         costs=tree.places[by_age, trees.COST],
     )
 
