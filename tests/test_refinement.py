@@ -103,7 +103,8 @@ def test_the_papers_scenes_are_solved_to_a_ten_millionth(name):
         refined = tp.refine(problem, path)
         check(problem, path, refined)
         errors.append(refined.length / truth - 1.0)
-        assert len(refined.points) < 8000  # 7,742 on the second-best way of repeat-4d
+        # The second-best way of repeat-4d bends more; it takes 7,742.
+        assert len(refined.points) < (6000 if errors[-1] < 7e-4 else 8000)
     # The second-best geodesics of these scenes are at least 7e-4 longer.
     assert all(-1e-10 < error < 4e-8 or error > 7e-4 for error in errors)
     assert sum(error < 4e-8 for error in errors) >= len(errors) / 2

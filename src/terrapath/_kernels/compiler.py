@@ -1,4 +1,4 @@
-"""The one decorator that every kernel carries, and dispatch on the surface's class."""
+"""The one decorator that every kernel carries: what is compiled, how, and where it is kept."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import logging
 import platform
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache, cached_property, wraps
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.typing.context import Context
-from numba.core.typing.templates import AbstractTemplate, Signature, infer_global
+from numba.core.typing.templates import Signature
 
 Kernel = Callable[..., Any]
 
@@ -357,48 +357,3 @@ def cache_key() -> str:
     """What machine code depends on: the kernels, the compiler, Python and the processor."""
     target = CPUDispatcher.targetdescr.target_context.codegen().magic_tuple()
     return "; ".join([_STAMP, numba_version, platform.python_version(), *map(str, target)])
-
-
-_DISPATCH = """
-def dispatch({arguments}):
-    return implementations[type({surface})]({arguments})
-"""
-
-
-def per_class(implementations: dict[type, Kernel]) -> Callable[[Kernel], Kernel]:
-    """Turn a declaration ``f(surface, ...)`` into dispatch on the surface's class.
-
-    Compiled callers resolve it at compile time, and call the implementation itself; plain
-    Python looks the class up. A surface is a ``NamedTuple`` of arrays and never a callback,
-    which is what lets a compiled planner be found in the cache by the next process.
-    """
-
-    def select(surface: types.Type) -> types.Dispatcher | None:
-        # A one-field tuple is typed as a NamedUniTuple, so match on the common base.
-        if not isinstance(surface, types.BaseNamedTuple):
-            return None
-        implementation = implementations.get(surface.instance_class)
-        return None if implementation is None else types.Dispatcher(implementation)
-
-    def declare(declaration: Kernel) -> Kernel:
-        names = declaration.__code__.co_varnames[: declaration.__code__.co_argcount]
-        scope: dict[str, Any] = {"implementations": implementations}
-        exec(_DISPATCH.format(arguments=", ".join(names), surface=names[0]), scope)
-        dispatch: Kernel = wraps(declaration)(scope["dispatch"])
-
-        class Dispatch(AbstractTemplate):
-            key = dispatch
-
-            def generic(self, args: tuple[types.Type, ...], kws: Any) -> Any:
-                chosen = select(args[0])
-                return None if chosen is None else chosen.get_call_type(self.context, args, kws)
-
-            def get_impl_key(self, signature: Any) -> Any:
-                chosen = select(signature.args[0])
-                return None if chosen is None else chosen.get_impl_key(signature)
-
-        if not config.DISABLE_JIT:
-            infer_global(dispatch, types.Function(Dispatch))
-        return dispatch
-
-    return declare

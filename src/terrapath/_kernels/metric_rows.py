@@ -9,7 +9,8 @@ import math
 import numpy as np
 
 from .bsplines import basis, basis_slope
-from .compiler import allocating_kernel, kernel, per_class
+from .compiler import allocating_kernel, kernel
+from .dispatch import per_class
 from .surfaces import Peaks, Spline, spline_cell
 
 # Places in the rows that are filled in.

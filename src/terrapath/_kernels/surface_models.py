@@ -3,7 +3,8 @@
 import math
 from typing import NamedTuple
 
-from .compiler import inner_kernel, kernel, per_class
+from .compiler import inner_kernel, kernel
+from .dispatch import per_class
 from .surfaces import Peaks, Spline
 from .taylor import (
     Model,

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .bsplines import Cell, basis, basis_curvature, basis_slope, column_sums, tensor_sum
-from .compiler import inner_kernel, kernel, per_class
+from .compiler import inner_kernel, kernel
+from .dispatch import per_class
 from .four import exp, four, fused, sqrt, total
 
 

@@ -1,0 +1,56 @@
+"""Dispatch on the surface's class."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+from numba import config, types
+from numba.core.typing.templates import AbstractTemplate, infer_global
+
+from .compiler import Kernel
+
+_DISPATCH = """
+def dispatch({arguments}):
+    return implementations[type({surface})]({arguments})
+"""
+
+
+def per_class(implementations: dict[type, Kernel]) -> Callable[[Kernel], Kernel]:
+    """Turn a declaration ``f(surface, ...)`` into dispatch on the surface's class.
+
+    Compiled callers resolve it at compile time, and call the implementation itself; plain
+    Python looks the class up. A surface is a ``NamedTuple`` of arrays and never a callback,
+    which is what lets a compiled planner be found in the cache by the next process.
+    """
+
+    def select(surface: types.Type) -> types.Dispatcher | None:
+        # A one-field tuple is typed as a NamedUniTuple, so match on the common base.
+        if not isinstance(surface, types.BaseNamedTuple):
+            return None
+        implementation = implementations.get(surface.instance_class)
+        return None if implementation is None else types.Dispatcher(implementation)
+
+    def declare(declaration: Kernel) -> Kernel:
+        names = declaration.__code__.co_varnames[: declaration.__code__.co_argcount]
+        scope: dict[str, Any] = {"implementations": implementations}
+        exec(_DISPATCH.format(arguments=", ".join(names), surface=names[0]), scope)
+        dispatch: Kernel = wraps(declaration)(scope["dispatch"])
+
+        class Dispatch(AbstractTemplate):
+            key = dispatch
+
+            def generic(self, args: tuple[types.Type, ...], kws: Any) -> Any:
+                chosen = select(args[0])
+                return None if chosen is None else chosen.get_call_type(self.context, args, kws)
+
+            def get_impl_key(self, signature: Any) -> Any:
+                chosen = select(signature.args[0])
+                return None if chosen is None else chosen.get_impl_key(signature)
+
+        if not config.DISABLE_JIT:
+            infer_global(dispatch, types.Function(Dispatch))
+        return dispatch
+
+    return declare
