@@ -1045,7 +1045,7 @@ def test_the_checker_shares_nothing_with_the_solver():
         "validation",
     }
     assert imports_of(kernels) == {"compiler", "surface_models", "surfaces", "taylor"}
-    assert imports_of(surface_models) == {"compiler", "surfaces", "taylor"}
+    assert imports_of(surface_models) == {"compiler", "dispatch", "surfaces", "taylor"}
     assert imports_of(taylor) == {"compiler"}
     loaded = in_another_process(
         "import json, sys, terrapath.certificate\n"
