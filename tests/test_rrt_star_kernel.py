@@ -139,8 +139,8 @@ def grown(problem, planner, draws):
 def best_path(tree):
     """Points (m, 2) from the start to the goal, and what each has cost."""
     way = [int(tree.counters[trees.GOAL])]
-    while tree.vertices[way[-1]]["parent"] >= 0:
-        way.append(int(tree.vertices[way[-1]]["parent"]))
+    while tree.links[way[-1]]["parent"] >= 0:
+        way.append(int(tree.links[way[-1]]["parent"]))
     rows = tree.places[way[::-1]]
     return rows[:, :2], rows[:, trees.COST]
 
@@ -155,14 +155,18 @@ def test_a_share_of_informed_samples_lies_around_the_best_path():
     for draw in random.random((4000, 3)):
         draw[0] *= sampling.PATH_SHARE
         x, y, worthwhile = kernels.sample(problem.surface.data, tree, settings, draw)
-        share = draw[0] / sampling.PATH_SHARE
-        centre = [np.interp(share * costs[-1], costs, points[:, k]) for k in (0, 1)]
-        away = math.hypot(x - centre[0], y - centre[1])
-        assert away == pytest.approx(radius * draw[1] ** 2, abs=1e-9)
-        assert line.distance(shapely.Point(x, y)) <= away + 1e-9
-        distances.append(away / radius)
+        run, offset = draw[1] * costs[-1], 2.0 * draw[2] - 1.0
+        centre = np.array([np.interp(run, costs, points[:, k]) for k in (0, 1)])
+        first = np.searchsorted(costs, run, side="right") - 1
+        along = points[first + 1] - points[first]
+        away = np.array([x, y]) - centre
+        assert math.hypot(*away) == pytest.approx(radius * abs(offset) ** 5, abs=1e-9)
+        assert along @ away == pytest.approx(0.0, abs=1e-9)
+        assert offset * (along[0] * away[1] - along[1] * away[0]) >= 0.0
+        assert line.distance(shapely.Point(x, y)) <= math.hypot(*away) + 1e-9
+        distances.append(math.hypot(*away) / radius)
         worth.append(worthwhile)
-    assert np.quantile(distances, 0.5) == pytest.approx(0.25, abs=0.02)
+    assert np.quantile(distances, 0.5) == pytest.approx(1.0 / 32.0, abs=0.01)
     assert np.mean(worth) > 0.9  # the chord rules none of them out that is on the path
 
 
@@ -205,13 +209,41 @@ def test_where_the_straight_way_is_blocked_samples_are_drawn_as_ever():
     assert len(tree.points) == 6 or off_line[6:].any()
 
 
+CHAIN = [(2.0, 1.0), (2.0, 2.0), (3.0, 2.0), (3.0, 3.0)]
+
+
+@pytest.mark.parametrize(
+    ("informed", "obstacles", "parents"),
+    [
+        (False, [], [-1, 0, 1, 2, 3]),
+        (True, [], [-1, 0, 0, 0, 3]),  # the last is more than a step away from the start
+        (True, [shapely.box(1.4, 1.4, 1.6, 1.6)], [-1, 0, 1, 0, 3]),
+    ],
+)
+def test_an_informed_tree_skips_parents_where_that_is_shorter(informed, obstacles, parents):
+    flat = tp.Surface.from_peaks([[]])
+    problem = tp.Problem(flat, (1, 1), (9, 8), bounds=(0, 0, 10, 10), obstacles=obstacles)
+    # So small a radius that the nearest vertex is the only candidate.
+    planner = tp.RRTStar(samples=10, step=2.5, radius_factor=0.05, informed=informed)
+    tree, settings = grown(problem, planner, np.empty((0, 3)))
+    for x, y in CHAIN:
+        assert kernels.extend(flat.data, problem.free_space.data, tree, settings, x, y)
+    found = tree_search._search_tree(tree)
+    np.testing.assert_array_equal(found.points[1:], CHAIN)
+    np.testing.assert_array_equal(found.parents, parents)
+    ways = found.points - found.points[found.parents]
+    edges = np.where(found.parents >= 0, np.hypot(*ways.T), 0.0)
+    np.testing.assert_allclose(found.costs, edges + found.costs[found.parents] * (edges > 0.0))
+
+
 # Counters
 
 
 def test_without_pruning_every_candidate_is_measured_exactly_once():
     # Each new vertex with m candidates considers m edges to itself and m - 1 back, and
     # measures m: so considered = 2 * integrated - (vertices - 1).
-    counters = tp.RRTStar(samples=800, prune=False).solve(scene("six-peaks", OBSTACLES)).counters
+    planner = tp.RRTStar(samples=800, prune=False, informed=False)
+    counters = planner.solve(scene("six-peaks", OBSTACLES)).counters
     expected = 2 * counters["edges integrated"] - (counters["vertices"] - 1)
     assert counters["edges considered"] == expected
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
-from .tree import COST, X, Y, chord_between, edge_length, survey
+from .tree import COST, TENSOR, X, Y, chord_between, edge_length, survey
 
 # Places in Graph.counters.
 OPEN = 0  # vertices in the heap
@@ -29,14 +29,13 @@ UNSEEN = 0
 DONE = -1
 WITHOUT_WAY = -2
 
-# A vertex: the metric, the way to it, and its slot of the heap.
+# A vertex: the way to it, its slot of the heap, and the metric tensor. That comes last: to
+# Numba, a tensor with more behind it would be a tensor.
 VERTEX = np.dtype(
     [
-        ("h11", np.float64),  # the metric at the vertex
-        ("h12", np.float64),
-        ("h22", np.float64),
         ("parent", np.int32),  # -1 at the start
         ("slot", np.int32),
+        *TENSOR.descr,
     ]
 )
 

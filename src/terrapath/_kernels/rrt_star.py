@@ -5,7 +5,7 @@ Cost(v_new) after it changes v_min; that update is meant, and made. The goal joi
 tree as a vertex as soon as one extension can reach it, and from then on is rewired like
 any other. An edge is as long as Line-R says but never shorter than its chord: both
 estimate its true length, and the chord is never above it. An informed tree tries the straight
-way to the goal first.
+way to the goal first, and hangs new vertices below their parents' parents where that is shorter.
 """
 
 import math
@@ -115,6 +115,18 @@ def find_near(tree, options, radius, x, y):
     return x, y, count + 1, count
 
 
+@inner_kernel
+def measure_chord(tree, new, k):
+    """Lay out the chord and the cost of the k-th candidate; no way through it is shorter."""
+    candidate = tree.near[k]
+    rise = squared_rise(tree, new, candidate.vertex)
+    candidate.chord = tree.floor * math.sqrt(candidate.squared + rise)
+    candidate.cost = tree.places[candidate.vertex, COST]
+    candidate.length = -1.0
+    candidate.free = -1
+    return candidate.cost + candidate.chord
+
+
 @kernel
 def measure_chords(tree, new, count):
     """Lay out the candidates' chords and costs; return the most promising one.
@@ -124,13 +136,7 @@ def measure_chords(tree, new, count):
     promising = -1
     least = math.inf
     for k in range(count):
-        candidate = tree.near[k]
-        rise = squared_rise(tree, new, candidate.vertex)
-        candidate.chord = tree.floor * math.sqrt(candidate.squared + rise)
-        candidate.cost = tree.places[candidate.vertex, COST]
-        candidate.length = -1.0
-        candidate.free = -1
-        bound = candidate.cost + candidate.chord
+        bound = measure_chord(tree, new, k)
         if bound < least:
             promising, least = k, bound
     return promising
@@ -167,6 +173,38 @@ def choose_parent(surface, space, tree, options, new, count, promising):
 
 
 @kernel
+def is_shorter(surface, space, tree, options, new, ancestor, spare):
+    """Is the new vertex cheaper to reach straight from an ancestor, at most a step away?"""
+    candidate, least = tree.near[spare], tree.places[new, COST]
+    candidate.vertex = ancestor
+    x, y = tree.places[new, X], tree.places[new, Y]
+    candidate.squared = squared_distance(tree.places, ancestor, x, y)
+    bound = measure_chord(tree, new, spare)
+    if candidate.squared > options.step * options.step:
+        return False
+    tree.counters[CONSIDERED] += 1
+    if options.prune and bound >= least:
+        tree.counters[PRUNED] += 1
+        return False
+    length = candidate_length(surface, tree, options, new, spare)
+    return candidate.cost + length < least and candidate_is_free(space, tree, new, spare)
+
+
+@kernel
+def skip_parents(surface, space, tree, options, new, spare):
+    """Hang the new vertex below its parent's parent, and so on, as long as that is shorter.
+
+    So paths have few bends already where the tree is thin (Jeong, Lee and Kim 2019).
+    spare : a place among the candidates that none takes.
+    """
+    ancestor = tree.links[tree.links[new].parent].parent
+    while ancestor >= 0 and is_shorter(surface, space, tree, options, new, ancestor, spare):
+        release(tree.links, new)
+        adopt(tree, ancestor, new, tree.near[spare].length)
+        ancestor = tree.links[ancestor].parent
+
+
+@kernel
 def rewire(surface, space, tree, options, new, count):
     """Hang candidates below the new vertex where that shortens their way.
 
@@ -174,7 +212,8 @@ def rewire(surface, space, tree, options, new, count):
     Rewiring one candidate can shorten the way to another; looking at that would let the order
     in which the candidates are visited decide the tree.
     """
-    come, parent, pruned = tree.places[new, COST], tree.vertices[new].parent, 0
+    come, parent = tree.places[new, COST], tree.links[new].parent
+    rewired, pruned = 0, 0
     for k in range(count):
         near = tree.near[k].vertex
         if near == parent:
@@ -184,22 +223,24 @@ def rewire(surface, space, tree, options, new, count):
             continue
         length = candidate_length(surface, tree, options, new, k)
         if come + length < tree.near[k].cost and candidate_is_free(space, tree, new, k):
-            tree.counters[REWIRED] += 1
-            release(tree.vertices, near)
+            release(tree.links, near)
             adopt(tree, new, near, length)
-            pass_on_cost(tree, near)
+            tree.queue[rewired] = near
+            rewired += 1
+    pass_on_cost(tree, rewired)
+    tree.counters[REWIRED] += rewired
     tree.counters[PRUNED] += pruned
 
 
 @kernel
 def refresh_buckets(tree, options, radius):
-    """Lay buckets and vertices out anew each time the tree has grown by a quarter."""
+    """Lay buckets and vertices out anew each time the tree has grown by half."""
     count = tree.counters[VERTICES]
-    if 4 * count >= 5 * tree.counters[LAID_OUT]:
+    if 2 * count >= 3 * tree.counters[LAID_OUT]:
         width, height = options.x1 - options.x0, options.y1 - options.y0
         resize(tree.buckets, width, height, SIDE * radius)
-        lay_out(tree.buckets, tree.places, count, tree.stack)
-        renumber(tree, count, tree.stack)
+        lay_out(tree.buckets, tree.places, count, tree.queue)
+        renumber(tree, count, tree.queue)
         tree.counters[LAID_OUT] = count
 
 
@@ -219,6 +260,8 @@ def extend(surface, space, tree, options, x, y):
     tree.counters[CONSIDERED] += 2 * count - 1
     if not choose_parent(surface, space, tree, options, new, count, promising):
         return False
+    if options.informed:
+        skip_parents(surface, space, tree, options, new, count)
     rewire(surface, space, tree, options, new, count)
     put(tree.buckets, tree.places, new)
     tree.counters[VERTICES] = new + 1

@@ -7,7 +7,7 @@ from .compiler import inner_kernel, kernel
 from .surfaces import spot_at, value_at
 from .tree import COST, GOAL, LIFTED, STRAIGHT, VERTICES, X, Y
 
-# Share of the samples of an informed tree that are drawn around the best path. With half of
+# Share of the samples of an informed tree that are drawn beside the best path. With half of
 # them the tree is too thin elsewhere, and too often keeps to the valley that it found first.
 PATH_SHARE = 0.3
 
@@ -82,23 +82,23 @@ def point_of_ellipse(tree, options, u, v):
 
 
 @inner_kernel
-def point_by_path(tree, options, share, u, v):
-    """A point at most a near radius from where the best path has run that share of its length.
+def point_by_path(tree, options, share, offset):
+    """A point beside where the best path has run that share of its length, straight across it.
 
-    Distances are spread over all scales: a quarter of them is less than a 16th of the radius.
+    It is at most a near radius away, for an offset from -1 to 1, with distances spread over
+    all scales: half of them are less than a 32nd of the radius.
     """
     vertex = tree.counters[GOAL]
     run = share * tree.places[vertex, COST]
-    parent = tree.vertices[vertex].parent
+    parent = tree.links[vertex].parent
     while tree.places[parent, COST] > run:
         vertex = parent
-        parent = tree.vertices[vertex].parent
+        parent = tree.links[vertex].parent
     p, q = tree.places[parent], tree.places[vertex]
     along = (run - p[COST]) / (q[COST] - p[COST])
-    distance = near_radius(tree, options) * u * u
-    x = p[X] + along * (q[X] - p[X]) + distance * math.cos(2.0 * math.pi * v)
-    y = p[Y] + along * (q[Y] - p[Y]) + distance * math.sin(2.0 * math.pi * v)
-    return x, y
+    dx, dy = q[X] - p[X], q[Y] - p[Y]
+    across = near_radius(tree, options) * offset**5 / math.hypot(dx, dy)
+    return p[X] + along * dx - across * dy, p[Y] + along * dy + across * dx
 
 
 @kernel
@@ -107,7 +107,7 @@ def sample(surface, tree, options, draw):
 
     draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share
     ``goal_bias`` of the samples is the goal, and of an informed tree as many of the first as
-    bring it straight towards the goal. From then on, informed samples come from around
+    bring it straight towards the goal. From then on, informed samples come from beside
     the best path (Akgun and Stilman 2011), a share of them, and from the ellipse that holds
     all better ones; those that the chord rules out are dropped (Gammell, Srinivasa and
     Barfoot 2014, with the chord in place of the distance).
@@ -121,7 +121,7 @@ def sample(surface, tree, options, draw):
     if not options.informed:
         return x, y, True
     if draw[0] < PATH_SHARE:
-        x, y = point_by_path(tree, options, draw[0] / PATH_SHARE, draw[1], draw[2])
+        x, y = point_by_path(tree, options, draw[1], 2.0 * draw[2] - 1.0)
     elif area_to_search(tree, options) < width * height:
         x, y = point_of_ellipse(tree, options, draw[1], draw[2])
     return x, y, is_within_bounds(options, x, y) and can_improve(surface, tree, x, y)

@@ -29,12 +29,12 @@ X, Y = 0, 1
 COST = 2  # length from the start
 LIFTED = 3  # the first of the weighted layer values
 
-# A vertex: what is read of it where an edge is measured, or changed.
-VERTEX = np.dtype(
+# The metric tensor at a vertex: what is read of it where an edge is measured.
+TENSOR = np.dtype([(name, np.float64) for name in ("h11", "h12", "h22")])
+
+# How a vertex hangs in the tree. Costs are passed on over many, so they lie close together.
+LINK = np.dtype(
     [
-        ("h11", np.float64),  # the metric at the vertex
-        ("h12", np.float64),
-        ("h22", np.float64),
         ("edge", np.float64),  # length of the edge from the parent
         ("parent", np.int32),  # -1 at the start
         ("child", np.int32),  # first child, -1 where none
@@ -63,12 +63,13 @@ class Tree(NamedTuple):
     """
 
     places: np.ndarray  # (n, LIFTED + layers) float64: rows of X, Y, COST and LIFTED
-    vertices: np.ndarray  # (n,) VERTEX
+    vertices: np.ndarray  # (n,) TENSOR
+    links: np.ndarray  # (n,) LINK
     counters: np.ndarray  # (COUNTERS,) int64, 0 before the tree is planted
     buckets: Buckets
     floor: float  # no cost of the surface is below it
     near: np.ndarray  # (n,) CANDIDATE: workspace
-    stack: np.ndarray  # (n,) int32: workspace
+    queue: np.ndarray  # (n,) int32: workspace
 
 
 class Options(NamedTuple):
@@ -140,8 +141,8 @@ def edge_length(surface, graph, a, b, panel):
 def place(surface, tree, new, x, y):
     """Write a vertex's position and what is cached with it; it is not yet in the tree."""
     survey(surface, tree, new, x, y)
-    tree.vertices[new].child = -1
-    tree.vertices[new].age = new
+    tree.links[new].child = -1
+    tree.links[new].age = new
 
 
 @kernel
@@ -149,7 +150,7 @@ def plant(surface, tree, options):
     """Make the start the tree's first vertex."""
     place(surface, tree, 0, options.start_x, options.start_y)
     tree.places[0, COST] = 0.0
-    root = tree.vertices[0]
+    root = tree.links[0]
     root.edge = 0.0
     root.parent = -1
     root.sibling = -1
@@ -163,42 +164,45 @@ def plant(surface, tree, options):
 @kernel
 def adopt(tree, parent, child, edge):
     """Hang a vertex below a parent."""
-    vertex = tree.vertices[child]
-    vertex.parent = parent
-    vertex.edge = edge
-    vertex.sibling = tree.vertices[parent].child
-    tree.vertices[parent].child = child
+    link = tree.links[child]
+    link.parent = parent
+    link.edge = edge
+    link.sibling = tree.links[parent].child
+    tree.links[parent].child = child
     tree.places[child, COST] = tree.places[parent, COST] + edge
 
 
 @kernel
-def release(vertices, child):
+def release(links, child):
     """Take a vertex from its parent's children."""
-    parent = vertices[vertices[child].parent]
+    parent = links[links[child].parent]
     if parent.child == child:
-        parent.child = vertices[child].sibling
+        parent.child = links[child].sibling
         return
     elder = parent.child
-    while vertices[elder].sibling != child:
-        elder = vertices[elder].sibling
-    vertices[elder].sibling = vertices[child].sibling
+    while links[elder].sibling != child:
+        elder = links[elder].sibling
+    links[elder].sibling = links[child].sibling
 
 
 @kernel
-def pass_on_cost(tree, root):
-    """Recompute the cost of everything below a vertex."""
-    tree.stack[0] = root
-    count = 1
-    while count > 0:
-        count -= 1
-        parent = tree.stack[count]
+def pass_on_cost(tree, count):
+    """Recompute the cost of everything below the first vertices of ``Tree.queue``.
+
+    In a queue: vertices that follow each other hang on different ones, and the processor
+    fetches several at once. From a stack each would be waited for.
+    """
+    done = 0
+    while done < count:
+        parent = tree.queue[done]
+        done += 1
         cost = tree.places[parent, COST]
-        child = tree.vertices[parent].child
+        child = tree.links[parent].child
         while child >= 0:
-            tree.places[child, COST] = cost + tree.vertices[child].edge
-            tree.stack[count] = child
+            tree.places[child, COST] = cost + tree.links[child].edge
+            tree.queue[count] = child
             count += 1
-            child = tree.vertices[child].sibling
+            child = tree.links[child].sibling
 
 
 # Vertices that lie near one another are looked at together. In the order in which they came
@@ -211,11 +215,17 @@ def renamed(numbers, vertex):
 
 
 @inner_kernel
+def swap_records(records, p, q, spare):
+    records[spare] = records[p]
+    records[p] = records[q]
+    records[q] = records[spare]
+
+
+@inner_kernel
 def swap(tree, p, q, spare):
     """Swap two vertices, by way of a spare one."""
-    tree.vertices[spare] = tree.vertices[p]
-    tree.vertices[p] = tree.vertices[q]
-    tree.vertices[q] = tree.vertices[spare]
+    swap_records(tree.vertices, p, q, spare)
+    swap_records(tree.links, p, q, spare)
     for entry in range(tree.places.shape[1]):
         number = tree.places[p, entry]
         tree.places[p, entry] = tree.places[q, entry]
@@ -226,10 +236,10 @@ def swap(tree, p, q, spare):
 def renumber(tree, count, numbers):
     """Give each of the first vertices its number in ``numbers`` (count,), which is used up."""
     for p in range(count):
-        vertex = tree.vertices[p]
-        vertex.parent = renamed(numbers, vertex.parent)
-        vertex.child = renamed(numbers, vertex.child)
-        vertex.sibling = renamed(numbers, vertex.sibling)
+        link = tree.links[p]
+        link.parent = renamed(numbers, link.parent)
+        link.child = renamed(numbers, link.child)
+        link.sibling = renamed(numbers, link.sibling)
     tree.counters[GOAL] = renamed(numbers, tree.counters[GOAL])
     for p in range(count):
         while numbers[p] != p:

@@ -30,8 +30,9 @@ class RRTStar:
     radius_factor : how many times the radius that optimality needs in theory.
     goal_bias : share of samples that are the goal, until it is reached.
     informed : begin with the straight way; then leave out samples that cannot improve the
-        best path, by the chord bound (Gammell et al. 2014), and draw 0.3 of them around it
-        (Akgun and Stilman 2011). ``False`` samples all of the region, as in the paper.
+        best path, by the chord bound (Gammell et al. 2014), and draw 0.3 of them beside it
+        (Akgun and Stilman 2011); hang vertices below their parents' parents where that is
+        shorter (Jeong et al. 2019). ``False`` does as the paper: it samples all of the region.
     prune : leave out edges that the chord rules out; the tree is the same without.
     panel : longest stretch that one application of Line-R measures, map units; by default
         as long as the surface's features allow; ``math.inf`` is Algorithm 1 to the letter.

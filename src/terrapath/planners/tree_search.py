@@ -80,7 +80,8 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
     room = size // 2 + 64  # for buckets
     return trees.Tree(
         places=np.empty((size, trees.LIFTED + len(surface.layers))),
-        vertices=np.empty(size, trees.VERTEX).view(np.recarray),
+        vertices=np.empty(size, trees.TENSOR).view(np.recarray),
+        links=np.empty(size, trees.LINK).view(np.recarray),
         counters=np.zeros(trees.COUNTERS, np.int64),
         buckets=Buckets(
             first=np.empty(room + 1, np.int32),
@@ -91,7 +92,7 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
         ),
         floor=surface.least_cost,
         near=np.empty(size, trees.CANDIDATE).view(np.recarray),
-        stack=np.empty(size, np.int32),
+        queue=np.empty(size, np.int32),
     )
 
 
@@ -203,7 +204,7 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
     vertex = int(tree.counters[trees.GOAL])
     if vertex < 0:
         return None
-    way, parents = [], tree.vertices["parent"]
+    way, parents = [], tree.links["parent"]
     while vertex >= 0:
         way.append(vertex)
         vertex = int(parents[vertex])
@@ -213,7 +214,7 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
 def _search_tree(tree: trees.Tree) -> SearchTree:
     """The vertices in the order in which they came."""
     count = int(tree.counters[trees.VERTICES])
-    ages, parents = tree.vertices["age"][:count], tree.vertices["parent"][:count]
+    ages, parents = tree.links["age"][:count], tree.links["parent"][:count]
     by_age = np.argsort(ages)
     known = np.append(ages, np.int32(-1))  # what the start's parent, -1, stands for
     return SearchTree(
