@@ -35,6 +35,7 @@ class Scale:
     tree_seeds: int = 20
     few_tree_seeds: int = 5  # of OMPL's other planners through Python
     sweep_seeds: int = 3  # of each choice of options
+    final_seeds: int = 9  # of the best of them
     tree_looks: tuple[int, int] = (20, 50_000)  # samples: the first, the last
     cpp_looks: tuple[float, float] = (0.0002, 2.5)  # seconds
     python_looks: tuple[float, float] = (0.02, 4.0)
@@ -66,6 +67,7 @@ QUICK = Scale(
     tree_seeds=5,
     few_tree_seeds=1,
     sweep_seeds=1,
+    final_seeds=1,
     tree_looks=(100, 20_000),
     cpp_looks=(0.002, 2.0),
     python_looks=(0.02, 4.0),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,7 +42,11 @@ class Looks(NamedTuple):
     share: float  # of all samples or seconds that may be given, at the last
 
 
-SWEEP, SHOWN = Looks(2.0, 0.5), Looks(1.25, 1.0)
+SWEEP, SHOWN = Looks(1.5, 0.5), Looks(1.25, 1.0)
+
+# How many of the options that a sweep with few seeds finds best are tried with more: of few seeds
+# one that finds a good valley late decides the median.
+FINALISTS = 3
 
 # Excess over the optimum that all are to get within, and those that are shown.
 NEAR = 5e-3
@@ -193,15 +197,18 @@ class _Comparison:
             return self.found[contender.as_of].options
         if len(contender.choices) == 1:
             return contender.choices[0]
-        seeds = self.scale.sweep_seeds
-        swept = [
-            (
-                _score(contender, self._curve(contender, options, seeds, SWEEP), self.optimum),
-                options,
-            )
-            for options in contender.choices
-        ]
-        return min(swept, key=lambda pair: pair[0])[1]
+        swept = sorted(contender.choices, key=self._score_of(contender, self.scale.sweep_seeds))
+        return min(swept[:FINALISTS], key=self._score_of(contender, self.scale.final_seeds))
+
+    def _score_of(
+        self, contender: Contender, seeds: int
+    ) -> Callable[[Options], tuple[float, float]]:
+        """How good options are, by the median of so many seeds."""
+
+        def score(options: Options) -> tuple[float, float]:
+            return _score(contender, self._curve(contender, options, seeds, SWEEP), self.optimum)
+
+        return score
 
     def _runs(
         self, contender: Contender, options: Options, seeds: int, looks: Looks
