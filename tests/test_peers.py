@@ -39,6 +39,7 @@ TINY = Scale(
     tree_seeds=2,
     few_tree_seeds=1,
     sweep_seeds=1,
+    final_seeds=2,
     tree_looks=(200, 800),
     cpp_looks=(0.01, 0.03),
     python_looks=(0.05, 0.1),
@@ -131,6 +132,22 @@ def test_trees_are_compared_with_their_best_options_and_stored(runner, fake_ompl
 
     monkeypatch.setattr(trees.TreeTrial, "measure", lambda self: pytest.fail("measured again"))
     assert trees.run_trees(TINY, runner) == data
+
+
+def test_of_the_best_three_of_a_sweep_more_seeds_choose(runner, monkeypatch):
+    contender = contenders.contenders(12.0)[0]
+    sweep = dict(zip(contender.choices, (5, 3, 9, 1, 2, 4, 6, 7, 8, 10, 11, 12), strict=True))
+    # All others would be better still with more seeds, and are not tried.
+    final = dict.fromkeys(sweep, 0)
+    first, second, third = sorted(sweep, key=sweep.get)[:3]
+    final |= {first: 3, second: 1, third: 2}
+
+    def score_of(self, asked, seeds):
+        assert asked is contender
+        return {TINY.sweep_seeds: sweep, TINY.final_seeds: final}[seeds].__getitem__
+
+    monkeypatch.setattr(trees._Comparison, "_score_of", score_of)
+    assert trees._Comparison("six-peaks", TINY, runner)._best_options(contender) == second
 
 
 def test_between_two_looks_the_logarithm_of_the_time_goes_with_the_length():
