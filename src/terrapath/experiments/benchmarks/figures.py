@@ -25,7 +25,7 @@ def label_percent(axis: Any) -> None:
 
 def label_plain(axis: Any) -> None:
     """Ticks of an axis as plain numbers."""
-    axis.set_major_formatter("{x:,g}")
+    axis.set_major_formatter("{x:,.7g}")
     axis.set_minor_formatter("")
 
 

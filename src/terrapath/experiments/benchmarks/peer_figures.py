@@ -6,6 +6,8 @@ import math
 from pathlib import Path
 from typing import Any
 
+from matplotlib.ticker import LogLocator
+
 from ..figures import new_figure, save_figure
 from .figures import TARGET_COLOUR, label_percent, label_plain
 from .grids import METHODS, GridsData
@@ -111,6 +113,7 @@ def draw_growth(data: GrowthData, directory: Path) -> list[Path]:
         axes.loglog(samples, allowed, ":", color=TARGET_COLOUR, lw=1.2)
     axes.set(xlabel="samples", ylabel="seconds", title="growth, and the most allowed")
     axes.set_xticks(sorted({row.samples for row in data.rows}))
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     label_plain(axes.xaxis)
     label_plain(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
