@@ -142,11 +142,11 @@ def test_of_the_best_three_of_a_sweep_more_seeds_choose(runner, monkeypatch):
     first, second, third = sorted(sweep, key=sweep.get)[:3]
     final |= {first: 3, second: 1, third: 2}
 
-    def score_of(self, asked, seeds):
+    def ranked(self, asked, choices, seeds):
         assert asked is contender
-        return {TINY.sweep_seeds: sweep, TINY.final_seeds: final}[seeds].__getitem__
+        return sorted(choices, key={TINY.sweep_seeds: sweep, TINY.final_seeds: final}[seeds].get)
 
-    monkeypatch.setattr(trees._Comparison, "_score_of", score_of)
+    monkeypatch.setattr(trees._Comparison, "_ranked", ranked)
     assert trees._Comparison("six-peaks", TINY, runner)._best_options(contender) == second
 
 

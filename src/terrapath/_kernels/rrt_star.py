@@ -117,7 +117,10 @@ def find_near(tree, options, radius, x, y):
 
 @inner_kernel
 def measure_chord(tree, new, k):
-    """Lay out the chord and the cost of the k-th candidate; no way through it is shorter."""
+    """Lay out the k-th candidate's chord and cost; return their sum.
+
+    No way through it to the new vertex is shorter.
+    """
     candidate = tree.near[k]
     rise = squared_rise(tree, new, candidate.vertex)
     candidate.chord = tree.floor * math.sqrt(candidate.squared + rise)
@@ -175,13 +178,12 @@ def choose_parent(surface, space, tree, options, new, count, promising):
 @kernel
 def is_shorter(surface, space, tree, options, new, ancestor, spare):
     """Is the new vertex cheaper to reach straight from an ancestor, at most a step away?"""
-    candidate, least = tree.near[spare], tree.places[new, COST]
+    candidate, p = tree.near[spare], tree.places[new]
     candidate.vertex = ancestor
-    x, y = tree.places[new, X], tree.places[new, Y]
-    candidate.squared = squared_distance(tree.places, ancestor, x, y)
-    bound = measure_chord(tree, new, spare)
+    candidate.squared = squared_distance(tree.places, ancestor, p[X], p[Y])
     if candidate.squared > options.step * options.step:
         return False
+    bound, least = measure_chord(tree, new, spare), p[COST]
     tree.counters[CONSIDERED] += 1
     if options.prune and bound >= least:
         tree.counters[PRUNED] += 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -197,18 +197,18 @@ class _Comparison:
             return self.found[contender.as_of].options
         if len(contender.choices) == 1:
             return contender.choices[0]
-        swept = sorted(contender.choices, key=self._score_of(contender, self.scale.sweep_seeds))
-        return min(swept[:FINALISTS], key=self._score_of(contender, self.scale.final_seeds))
+        swept = self._ranked(contender, contender.choices, self.scale.sweep_seeds)
+        return self._ranked(contender, swept[:FINALISTS], self.scale.final_seeds)[0]
 
-    def _score_of(
-        self, contender: Contender, seeds: int
-    ) -> Callable[[Options], tuple[float, float]]:
-        """How good options are, by the median of so many seeds."""
-
-        def score(options: Options) -> tuple[float, float]:
-            return _score(contender, self._curve(contender, options, seeds, SWEEP), self.optimum)
-
-        return score
+    def _ranked(
+        self, contender: Contender, choices: Sequence[Options], seeds: int
+    ) -> list[Options]:
+        """The choices by the median of so many seeds, the best first."""
+        scored = {
+            options: _score(contender, self._curve(contender, options, seeds, SWEEP), self.optimum)
+            for options in choices
+        }
+        return sorted(scored, key=scored.__getitem__)
 
     def _runs(
         self, contender: Contender, options: Options, seeds: int, looks: Looks
