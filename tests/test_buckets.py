@@ -45,12 +45,12 @@ def make(x, y, side, count=None, room=64, frame=(X0, Y0, WIDTH, HEIGHT)):
 
 
 def found_within(buckets, points, at, radius):
-    found = np.zeros(len(points) + 1, CANDIDATE).view(np.recarray)
+    found = np.zeros(len(points) + 1, CANDIDATE)
     count = kernels.within(buckets, points, at[0], at[1], radius, found)
-    listed = found.vertex[:count].tolist()
+    listed = found["vertex"][:count].tolist()
     assert len(set(listed)) == len(listed)
     squared = ((points[listed, :2] - at) ** 2).sum(axis=1)
-    np.testing.assert_allclose(found.squared[:count], squared, rtol=1e-12)
+    np.testing.assert_allclose(found["squared"][:count], squared, rtol=1e-12)
     return set(listed)
 
 

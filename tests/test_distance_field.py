@@ -168,7 +168,7 @@ def test_the_kernel_settles_as_a_heap_does():
     )
     # Only the seeds: the oracle knows no factoring.
     model = model._replace(values=np.full_like(model.values, np.nan))
-    assert medium.nodes.around.any()
+    assert medium.nodes["around"].any()
     expected = HeapMarch(medium, model, given_tensors).values()
     # Weights are kept in single precision, and so are lengths of edges made of them.
     assert medium.march(model) == pytest.approx(expected, rel=1e-8)

@@ -148,8 +148,8 @@ def test_the_moves_are_those_of_the_board():
 def test_the_heap_gives_vertices_in_the_order_of_their_keys():
     random = np.random.default_rng(5)
     for size in (1, 2, 5, 300):
-        vertices = np.zeros(size, kernels.VERTEX).view(np.recarray)
-        heap = np.zeros(size + 1, kernels.ENTRY).view(np.recarray)
+        vertices = np.zeros(size, kernels.VERTEX)
+        heap = np.zeros(size + 1, kernels.ENTRY)
         keys = np.round(random.uniform(0, 50, size))
         held = 0
         for vertex in range(size):
@@ -157,14 +157,14 @@ def test_the_heap_gives_vertices_in_the_order_of_their_keys():
             kernels.raise_to(vertices, heap, held, vertex, keys[vertex])
         for vertex in random.choice(size, size // 2, replace=False).tolist():
             keys[vertex] -= random.uniform(0.0, 20.0)
-            kernels.raise_to(vertices, heap, int(vertices.slot[vertex]), vertex, keys[vertex])
+            kernels.raise_to(vertices, heap, int(vertices["slot"][vertex]), vertex, keys[vertex])
         expected = sorted(keys)
         for key in expected:
             first = kernels.take_first(vertices, heap, held)
             held -= 1
             assert keys[first] == key
-            assert vertices.slot[first] == kernels.DONE
-            slots = vertices.slot[vertices.slot > 0]
+            assert vertices["slot"][first] == kernels.DONE
+            slots = vertices["slot"][vertices["slot"] > 0]
             assert sorted(slots) == list(range(1, held + 1))
 
 

@@ -107,7 +107,7 @@ class Medium:
         front = self._front(model)
         rows = slice(model.row, model.row + model.values.shape[0])
         columns = slice(model.column, model.column + model.values.shape[1])
-        window = self.nodes.links.reshape(lattice.ny, lattice.nx)[rows, columns]
+        window = self.nodes["links"].reshape(lattice.ny, lattice.nx)[rows, columns]
         window[~np.isnan(model.values)] |= stencils.WINDOW
         try:
             kernels.plant(
@@ -166,7 +166,7 @@ def _allocate(lattice: Lattice) -> Any:
             f"the lattice has {lattice.nx:,} x {lattice.ny:,} nodes, more than {LONGEST_SIDE:,} "
             f"on a side or {MOST_NODES:,} in all; give a wider spacing"
         )
-    return np.zeros(count, stencils.NODE).view(np.recarray)
+    return np.zeros(count, stencils.NODE)
 
 
 @dataclass(frozen=True, eq=False)

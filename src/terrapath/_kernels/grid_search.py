@@ -32,16 +32,19 @@ WITHOUT_WAY = -2
 # A vertex: the way to it, its slot of the heap, and the metric tensor. That comes last: to
 # Numba, a tensor with more behind it would be a tensor.
 VERTEX = np.dtype(
-    [
-        ("parent", np.int32),  # -1 at the start
-        ("slot", np.int32),
-        *TENSOR.descr,
-    ]
+    (
+        np.record,
+        [
+            ("parent", np.int32),  # -1 at the start
+            ("slot", np.int32),
+            *TENSOR.descr,
+        ],
+    )
 )
 
 
 # A slot of the heap.
-ENTRY = np.dtype([("key", np.float64), ("vertex", np.int32)])
+ENTRY = np.dtype((np.record, [("key", np.float64), ("vertex", np.int32)]))
 
 
 class Nodes(NamedTuple):

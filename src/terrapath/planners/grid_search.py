@@ -177,9 +177,9 @@ def _allocate(lattice: Lattice, surface: Surface) -> kernels.Graph:
     size = lattice.nx * lattice.ny + 2
     try:
         return kernels.Graph(
-            vertices=np.zeros(size, kernels.VERTEX).view(np.recarray),
+            vertices=np.zeros(size, kernels.VERTEX),
             places=np.empty((size, trees.LIFTED + len(surface.layers))),
-            heap=np.empty(size + 1, kernels.ENTRY).view(np.recarray),
+            heap=np.empty(size + 1, kernels.ENTRY),
             counters=np.zeros(kernels.COUNTERS, np.int64),
             floor=surface.least_cost,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from ..errors import InputError
@@ -33,6 +33,7 @@ PLANNERS: dict[str, Callable[..., Planner]] = {
 }
 
 
+@cache
 def _options(factory: Callable[..., Planner]) -> list[str]:
     """Names of the options of a planner that its registered name leaves open."""
     kind: Any = factory

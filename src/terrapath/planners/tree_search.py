@@ -80,8 +80,8 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
     room = size // 2 + 64  # for buckets
     return trees.Tree(
         places=np.empty((size, trees.LIFTED + len(surface.layers))),
-        vertices=np.empty(size, trees.TENSOR).view(np.recarray),
-        links=np.empty(size, trees.LINK).view(np.recarray),
+        vertices=np.empty(size, trees.TENSOR),
+        links=np.empty(size, trees.LINK),
         counters=np.zeros(trees.COUNTERS, np.int64),
         buckets=Buckets(
             first=np.empty(room + 1, np.int32),
@@ -91,7 +91,7 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
             shape=np.zeros(2, np.int64),
         ),
         floor=surface.least_cost,
-        near=np.empty(size, trees.CANDIDATE).view(np.recarray),
+        near=np.empty(size, trees.CANDIDATE),
         queue=np.empty(size, np.int32),
     )
 
@@ -216,12 +216,10 @@ def _search_tree(tree: trees.Tree) -> SearchTree:
     count = int(tree.counters[trees.VERTICES])
     ages, parents = tree.links["age"][:count], tree.links["parent"][:count]
     by_age = np.argsort(ages)
-    known = np.append(ages, np.int32(-1))  # what the start's parent, -1, stands for
-    return SearchTree(
-        points=tree.places[by_age, : trees.COST],
-        parents=known[parents[by_age]],
-        costs=tree.places[by_age, trees.COST],
-    )
+    parents = ages[parents[by_age]]
+    parents[0] = -1  # the start came first
+    points, costs = tree.places[by_age, : trees.COST], tree.places[by_age, trees.COST]
+    return SearchTree(points, parents, costs)
 
 
 def _counters(tree: trees.Tree) -> dict[str, int]:
