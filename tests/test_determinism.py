@@ -187,7 +187,9 @@ def test_plain_python_agrees_with_the_compiled_kernels(here):
 @pytest.mark.parametrize("module", sorted(path.name for path in KERNELS.glob("*.py")))
 def test_a_comment_in_any_kernel_module_changes_the_stamp(module, tmp_path):
     shutil.copytree(KERNELS, tmp_path / "kernels", ignore=shutil.ignore_patterns("__pycache__"))
-    spec = importlib.util.spec_from_file_location("copied", tmp_path / "kernels" / "compiler.py")
+    spec = importlib.util.spec_from_file_location(
+        "terrapath._kernels.copied", tmp_path / "kernels" / "compiler.py"
+    )
     copied = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(copied)
     before = copied._package_stamp()
@@ -213,7 +215,8 @@ def test_an_edited_callee_in_another_module_makes_its_caller_stale(tmp_path):
     package = tmp_path / "copied"
     package.mkdir()
     (package / "__init__.py").touch()
-    shutil.copy(KERNELS / "compiler.py", package)
+    for module in ("compiler.py", "signatures.py"):
+        shutil.copy(KERNELS / module, package)
     (package / "callee.py").write_text(CALLEE.format("1.0"))
     (package / "caller.py").write_text(CALLER)
     call = CALL.format(str(tmp_path))

@@ -11,7 +11,7 @@ import pytest
 
 from processes import in_another_process
 from terrapath import warmup
-from terrapath._kernels import compiler
+from terrapath._kernels import compiler, signatures
 from terrapath.cli import compiling
 from terrapath.cli.main import run
 from terrapath.errors import InputError
@@ -88,7 +88,8 @@ def call(tmp_path):
     package = tmp_path / "copied"
     package.mkdir()
     (package / "__init__.py").touch()
-    shutil.copy(compiler.__file__, package)
+    for module in (compiler, signatures):
+        shutil.copy(module.__file__, package)
     (package / "callee.py").write_text(CALLEE)
     (package / "caller.py").write_text(CALLER)
     code = CALL.format(str(tmp_path), compiling.LOGGER)

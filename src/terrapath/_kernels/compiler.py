@@ -19,10 +19,12 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 from numba.core.compiler_machinery import PassManager
+from numba.core.cpu import CPUContext
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.typing.context import Context
-from numba.core.typing.templates import Signature
+
+from .signatures import Target, Typing
 
 Kernel = Callable[..., Any]
 
@@ -174,34 +176,11 @@ _SPARED = frozenset(
 )
 
 
-# The type of what one of Numba's own functions returns, by its type and those of its arguments.
-_found: dict[tuple[types.Function, tuple[types.Type, ...]], Signature] = {}
-
-
-class _Typing(Context):
-    """Numba's knowledge of types, with a memory.
-
-    Numba tries anew at each ``+`` whether it is one of arrays, of dates or of two lists.
-    """
-
-    def __init__(self, context: Context) -> None:
-        self.__dict__ = context.__dict__  # all that it knows, and what it learns later
-
-    def resolve_function_type(self, function: Any, args: tuple[types.Type, ...], kws: Any) -> Any:
-        if kws or not isinstance(function, types.Function):
-            return super().resolve_function_type(function, args, kws)
-        signature = _found.get((function, args))
-        if signature is None:
-            signature = super().resolve_function_type(function, args, kws)
-            _found[function, args] = signature
-        return signature
-
-
 class _LibraryCompiler(Compiler):
     """A compiler that keeps what it makes in a library of ours, and does only what kernels need."""
 
-    def __init__(self, typing: Context, *rest: Any) -> None:
-        super().__init__(_Typing(typing), *rest)
+    def __init__(self, typing: Context, target: CPUContext, *rest: Any) -> None:
+        super().__init__(Typing(typing), Target(target), *rest)
 
     def define_pipelines(self) -> list[PassManager]:
         pipelines = super().define_pipelines()
@@ -279,8 +258,13 @@ class _Part(CPUDispatcher):
     def get_call_template(self, args: tuple[types.Type, ...], kws: Any) -> Any:
         return super().get_call_template(tuple(map(_settled, args)), kws)
 
-    def add_overload(self, result: CompileResult) -> None:
-        self.overloads[tuple(result.signature.args)] = result
+    def compile(self, args: tuple[types.Type, ...]) -> Any:
+        """Without clocks, which would look at each other where parts call parts."""
+        if args not in self.overloads:
+            with self._compiling_counter:
+                result = self._compiler.compile(args, None)
+            self.overloads[tuple(result.signature.args)] = result
+        return self.overloads[args].entry_point
 
 
 _kernels: list[Any] = []
