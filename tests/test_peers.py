@@ -386,6 +386,17 @@ def test_a_process_that_takes_too_long_is_ended(monkeypatch):
         processes.run_fresh("growth", {}, "it", timeout=5.0)
 
 
+def test_what_a_process_measures_that_compiled_is_measured_again(monkeypatch):
+    replies = [{"compiled": 2, "found": "first"}, {"compiled": 0, "found": "second"}]
+
+    def done(command, **options):
+        return subprocess.CompletedProcess(command, 0, json.dumps(replies.pop(0)), "")
+
+    monkeypatch.setattr(subprocess, "run", done)
+    assert processes.run_fresh("growth", {}, "it") == "second"
+    assert replies == []
+
+
 # Lattices, growth, edges
 
 
