@@ -88,6 +88,27 @@ def test_the_bounds_are_of_the_corridor_and_of_the_map(found):
     solution.certificate.check(solution.problem)
 
 
+def test_with_costs_nothing_is_said_of_the_whole_map(small_limits):
+    # A track across the map that no coarse mean of costs can show.
+    cost = np.ones((COUNT, COUNT))
+    cost[20:22] = 0.05
+    source = tp.LayerSource((cost, AXIS, AXIS))
+    ends = (400.0, 850.0), (2600.0, 850.0)
+
+    def pose(part):
+        flat = (np.zeros((COUNT, COUNT)), AXIS, AXIS)
+        surface = tp.read_surface(
+            flat, within=part.within, decimate=part.decimate, costs={"cost": source}
+        )
+        area = None if part.corridor is None else part.corridor.area_on(surface)
+        return tp.Problem(surface, *ends, keep_in=area), ()
+
+    solution = plan_in_corridor(pose, PLANNER, COUNT**2)
+    cheaper = tp.plan(pose(Part())[0], "fast-marching")
+    assert cheaper.length < 0.99 * tp.chord(solution.problem.surface, *ends)
+    assert solution.corridor.least_length(solution) is None
+
+
 def test_a_narrower_corridor_is_obeyed(small_limits):
     solution = plan_in_corridor(lambda part: (read(part), ()), PLANNER, COUNT**2, half_width=55.0)
     assert solution.corridor.half_width == 55.0

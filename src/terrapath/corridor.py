@@ -1,7 +1,7 @@
 """Maps too large to plan on as a whole: first coarse, then fine around the coarse route.
 
 The bound of the fine answer holds for paths in the corridor alone, and is said to; for the
-whole map the chord is a bound.
+whole map the chord is a bound, where no cost layer can make ground cheap elsewhere.
 """
 
 from __future__ import annotations
@@ -83,9 +83,13 @@ class Corridor:
         return shapely.transform(self.area.segmentize(0.25 * self.half_width), moved)
 
     @staticmethod
-    def least_length(solution: Solution) -> float:
-        """No path on the whole map is shorter: the chords from stop to stop, map units."""
-        return metric.chord_through(solution.problem.surface, solution.stops)
+    def least_length(solution: Solution) -> float | None:
+        """No path on the whole map is shorter: the chords from stop to stop, map units.
+
+        None with cost layers: their least on the map is not known, for only a part was read.
+        """
+        surface = solution.problem.surface
+        return None if surface.costs else metric.chord_through(surface, solution.stops)
 
 
 # The problem on a part of the map, and the points that are to be passed.

@@ -122,7 +122,10 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
         f"{corridor.decimate} times coarser",
     )
     least = corridor.least_length(solution)
-    yield "elsewhere", f"no path on the map is shorter than {_amount(least, unit)}, by chords"
+    if least is None:
+        yield "elsewhere", "nothing is proven: the map may cost less there"
+    else:
+        yield "elsewhere", f"no path on the map is shorter than {_amount(least, unit)}, by chords"
 
 
 def _each(surface: Surface, values: Iterable[float]) -> str:
