@@ -296,6 +296,15 @@ def test_a_route_over_exact_peaks_keeps_to_the_slope():
     assert steepest(free.path) > 25.0
 
 
+def test_steep_ground_beyond_the_bounds_keeps_the_vehicle_off_too():
+    # The flank of a hill whose foot the bounds cut off.
+    hill = tp.Surface.from_peaks([[(4.0, 1.0, 7.0, 5.0)]])
+    ends, bounds = ((1.0, 5.0), (4.9, 5.0)), (0.0, 0.0, 5.0, 10.0)
+    tp.Problem(hill, *ends, bounds, max_slope=25)
+    with pytest.raises(tp.InputError, match=r"radius=0\.8"):
+        tp.Problem(hill, *ends, bounds, max_slope=25, radius=0.8)
+
+
 def test_a_route_on_a_real_map_keeps_to_the_slope_by_horn_and_by_differences():
     data = get_sample_data("jacksboro_fault_dem.npz")
     heights = data["elevation"].astype(float)[::-1]

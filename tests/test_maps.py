@@ -15,6 +15,7 @@ from pyproj import CRS, Transformer
 from scipy.ndimage import binary_dilation
 
 import terrapath as tp
+from terrapath.cli.main import run
 from terrapath.surface.grid import Grid
 from terrapath.surface.holes import continue_into_holes, fill_small_holes
 from terrapath.surface.resampling import resample
@@ -420,6 +421,36 @@ def test_arrays_that_are_no_maps_are_refused_in_one_line(array, said):
 
 
 # Windows and coarser maps
+
+
+@pytest.mark.parametrize(
+    ("crs", "corner", "cell"),
+    [("EPSG:32633", (500_000.0, 4_000_000.0), 10.0), ("EPSG:4326", (15.0, 60.0), 1e-4)],
+)
+def test_a_margin_around_a_window_is_read_too(tmp_path, crs, corner, cell):
+    values = np.random.default_rng(5).normal(size=(300, 300))
+    transform = Affine(cell, 0.0, corner[0], 0.0, -cell, corner[1])
+    path = write(tmp_path / "dem.tif", values, transform, crs=crs)
+    west, north = corner[0] + 140 * cell, corner[1] - 140 * cell
+    window = (west, north - 20 * cell, west + 20 * cell, north)
+    margin = 6.0 * tp.read_surface(path, within=window).resolution
+    part = tp.read_surface(path, within=window, margin=margin)
+    ends = np.array([window[:2], window[2:]])
+    inside = part.georeference.from_map(ends)
+    (west, south), (east, north) = inside.min(axis=0) - margin, inside.max(axis=0) + margin
+    assert part.bounds.encloses(tp.validation.Bounds(west, south, east, north))
+    side = np.ptp(inside, axis=0).max()
+    assert max(part.bounds.width, part.bounds.height) < 2.0 * (side + margin)
+
+
+def test_what_is_blocked_beyond_the_bounds_keeps_the_vehicle_off(tmp_path, capsys):
+    heights = np.zeros((100, 100))
+    heights[:, 60:] = np.nan
+    path = write(tmp_path / "dem.tif", heights, Affine(0.1, 0.0, 0.0, 0.0, -0.1, 10.0))
+    asked = ["plan", str(path), "--start", "1,5", "--goal", "4,5", "--bounds", "0,0,4.5,10"]
+    assert run([*asked, "--radius", "1.9", "--quiet"]) == 0
+    assert run([*asked, "--radius", "2.1", "--quiet"]) == 2
+    assert "goal=(4, 5) is nearer than radius=2.1" in capsys.readouterr().err
 
 
 def test_within_reads_a_window_with_a_margin(tmp_path):

@@ -68,11 +68,13 @@ class Problem:
         self.radius = float(radius)
         self.max_slope = max_slope
         self.keep_in = keep_in
+        # Ground beyond the bounds keeps the vehicle off, too.
+        around = self.bounds.widened(self.radius)
         self.constraints = Constraints(
             bounds=self.bounds,
             obstacles=given,
             nodata=surface.nodata,
-            steepness=None if max_slope is None else Steepness(surface, max_slope, self.bounds),
+            steepness=None if max_slope is None else Steepness(surface, max_slope, around),
             outside=None if keep_in is None else outside_of(keep_in, self.bounds, self.radius),
             radius=self.radius,
         )

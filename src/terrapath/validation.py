@@ -37,6 +37,11 @@ class Bounds(NamedTuple):
         """Side of the square that is as large, map units."""
         return math.sqrt(self.width * self.height)
 
+    def widened(self, margin: float) -> Bounds:
+        """With so much more on every side, map units."""
+        low, high = (self.x1_min - margin, self.x2_min - margin), self[2:]
+        return Bounds(*low, high[0] + margin, high[1] + margin)
+
     def contains(self, points: Array) -> npt.NDArray[np.bool_]:
         """Points (..., 2) -> (...) bool."""
         x, y = points[..., 0], points[..., 1]

@@ -163,7 +163,14 @@ class Question:
         window, decimate = self.scenario.route.bounds, 1
         if part is not None:
             window, decimate = part.within or window, part.decimate
-        surface = read_surface(asked.path, within=window, decimate=decimate, **read_options(asked))
+        surface = read_surface(
+            asked.path,
+            within=window,
+            # What is blocked beyond the bounds keeps the vehicle off, too.
+            margin=self.scenario.constraints.radius,
+            decimate=decimate,
+            **read_options(asked),
+        )
         return Place(surface, None, path.stem, {})
 
     def _end(self, place: Place, name: str, point: Point | None) -> Point:

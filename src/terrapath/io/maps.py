@@ -202,11 +202,11 @@ def _costs_onto(name: str, view: View, target: Grid, out: Array) -> None:
     np.exp(out, out=out)
 
 
-def _base_view(band: Band, within: Any, decimate: int, most_cells: int) -> View:
+def _base_view(band: Band, within: Any, margin: float, decimate: int, most_cells: int) -> View:
     """What is read of the heights; refused where it is too large, before it is read."""
     view = View.whole(band).coarser(decimate)
     if within is not None:
-        view = view.within(as_bounds(within, "within"))
+        view = view.within(as_bounds(within, "within"), margin)
     view.require_size(most_cells)
     return view
 
@@ -273,6 +273,7 @@ def read_surface(
     smoothing: float | str | None = "auto",
     crs: Any = None,
     within: Any = None,
+    margin: float = 0.0,
     decimate: int = 1,
     most_cells: int = MOST_CELLS,
 ) -> Surface:
@@ -287,21 +288,22 @@ def read_surface(
     smoothing : standard deviation, map units; "auto": the least that heights rounded to a
     step need, none where they are not; None or 0: none.
     crs : where the map has none. within : (x_min, y_min, x_max, y_max) in the map's own
-    coordinates; only that is read. decimate : means over so many cells a side are read.
-    most_cells : a map with more is refused before memory is taken.
+    coordinates; only that is read. margin : so much more around it, map units of the plane: what
+    lies beyond is not seen, and a vehicle's radius reaches over the edge. decimate : means over
+    so many cells a side are read. most_cells : a map with more is refused before memory is taken.
 
     A map in degrees, or turned, is brought onto a local projection in metres; heights are
     brought into the plane's unit. Raises MapError or InputError with the file, the value and
     the remedy.
     """
-    require_not_negative(fill_holes=fill_holes)
+    require_not_negative(fill_holes=fill_holes, margin=margin)
     require_count(decimate=decimate)
     require_count(most=2**62, most_cells=most_cells)
     given = parse_crs(crs, f"crs={crs!r}")
     with gdal(), ExitStack() as files:
         height = LayerSource(_as_path(source) if isinstance(source, str) else source, height_band)
         parts = _collect(height, layers or {}, costs or {}, files, given)
-        base = _base_view(parts[0].band, within, decimate, most_cells)
+        base = _base_view(parts[0].band, within, margin, decimate, most_cells)
         target = base.grid.planning_grid()
         bands = _read_all(parts, base, target, most_cells)
         plane = "" if target.crs is None else Georeference(target.crs, target.crs).unit

@@ -74,6 +74,22 @@ class Grid:
         t = self.transform
         return math.sqrt(abs(t.a * t.e - t.b * t.d))
 
+    def reach(self, length: float) -> tuple[int, int]:
+        """How many rows and columns a length on the plane reaches over at most."""
+        columns, rows = np.meshgrid([0, self.columns - 1], [0, self.rows - 1])
+        corner = self._on_plane(columns, rows)
+        steps = ((columns, rows + 1), (columns + 1, rows))
+        sides = [np.hypot(*(self._on_plane(*step) - corner)).min() for step in steps]
+        return math.ceil(length / sides[0]), math.ceil(length / sides[1])
+
+    def _on_plane(self, columns: Array, rows: Array) -> Array:
+        """(2, ...): where corners between cells lie on the plane that is planned in."""
+        x, y = self.place(columns, rows)
+        plane = self._plane()
+        if self.crs is not None and plane is not None and plane != self.crs:
+            x, y = transformer(self.crs, plane).transform(x, y)
+        return np.asarray([x, y])
+
     def place(self, column: Array | float, row: Array | float) -> tuple[Array, Array]:
         """Map coordinates of the corners between cells."""
         t = self.transform
