@@ -8,6 +8,8 @@ import pytest
 import shapely
 
 import terrapath as tp
+from terrapath.io import route_record
+from terrapath.metric import curve_length
 from terrapath.planners import (
     Planner,
     Progress,
@@ -71,6 +73,14 @@ def test_the_bound_holds_for_other_paths_through_the_waypoints(problem, tour):
         bends = [np.clip(stop + generator.normal(0.0, 1.0, 2), -1, 11) for stop in (*VIA, (9, 9))]
         stops = [problem.start, bends[0], VIA[0], bends[1], VIA[1], bends[2], problem.goal]
         assert tp.curve_length(problem.surface, stops) >= tour.lower_bound
+
+
+def test_the_record_of_a_tour_has_its_legs_and_their_straight_ways(problem, tour):
+    record = route_record(tour)
+    assert [leg["goal"] for leg in record["legs"]] == [[*stop] for stop in (*VIA, problem.goal)]
+    assert [leg["length"] for leg in record["legs"]] == [leg.length for leg in tour.legs]
+    straight = curve_length(problem.surface, [problem.start, *VIA, problem.goal])
+    assert record["straight_length"] == pytest.approx(straight, rel=1e-8)
 
 
 def walled(**options):

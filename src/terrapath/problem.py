@@ -334,6 +334,11 @@ class Solution:
         return np.array([self.problem.start, *ends])
 
     @property
+    def straight_length(self) -> float:
+        """Length on the surface of the straight ways from stop to stop, obstacles or not."""
+        return sum(leg.problem.straight_length for leg in self.legs or (self,))
+
+    @property
     def via(self) -> Array:
         """(k, 2): stops of the route between start and goal, map units; none without a route."""
         return self.stops[1:-1] if self.path is not None else np.empty((0, 2))

@@ -32,11 +32,9 @@ class Answer:
     def record(self) -> dict[str, Any]:
         """Ready for JSON."""
         from ..io import route_record
-        from .records import goal_records, leg_records
+        from .records import goal_records
 
         record = route_record(self.solution)
-        if self.solution.legs:
-            record["legs"] = leg_records(self.solution)
         if self.goals:
             record["goals"] = goal_records(self.goals)
         return record

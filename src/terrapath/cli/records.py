@@ -1,4 +1,4 @@
-"""Legs and goals as records for JSON."""
+"""Goals as records for JSON."""
 
 from __future__ import annotations
 
@@ -7,22 +7,6 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..planners import GoalAnswer
-from ..problem import Solution
-
-
-def leg_records(solution: Solution) -> list[dict[str, Any]]:
-    """One for each leg that was planned."""
-    return [
-        {
-            "start": list(leg.problem.start),
-            "goal": list(leg.problem.goal),
-            "status": leg.status.value,
-            "length": leg.length,
-            "lower_bound": leg.lower_bound,
-            "seconds": leg.seconds,
-        }
-        for leg in solution.legs
-    ]
 
 
 def goal_state(answer: GoalAnswer) -> str:

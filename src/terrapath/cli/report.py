@@ -72,8 +72,7 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
     assert solution.cost is not None
     yield "planner's cost", _amount(solution.cost, unit)
-    straight = sum(leg.problem.straight_length for leg in solution.legs or [solution])
-    yield "straight-line length", _amount(straight, unit)
+    yield "straight-line length", _amount(solution.straight_length, unit)
     yield "climb", _amount(path.climb, problem.surface.layers[0].unit)
     yield from _contributions(path)
     if solution.alternatives:

@@ -30,7 +30,8 @@ def _title(solution: Solution) -> str:
     name = f"{in_words(problem.name)}: " if problem.name else ""
     if length is None:
         return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
-    saved = 1.0 - length / problem.straight_length if problem.straight_length else 0.0
+    straight = solution.straight_length
+    saved = 1.0 - length / straight if straight else 0.0
     against = f"{abs(saved):.1%} {'shorter' if saved >= 0.0 else 'longer'} than the straight way"
     refined = "" if solution.unrefined is None else ", refined"
     title = (

@@ -101,10 +101,25 @@ def _measures(solution: Solution) -> dict[str, Any]:
         "lower_bound": solution.lower_bound,
         "gap": solution.gap,
         "climb": None if path is None else path.climb,
-        "straight_length": solution.problem.straight_length,
+        "straight_length": solution.straight_length,
         "contributions": None if path is None else path.contributions,
         "unit": solution.problem.surface.unit,
     }
+
+
+def _legs(solution: Solution) -> list[dict[str, Any]]:
+    """One for each leg that was planned."""
+    return [
+        {
+            "start": leg.problem.start,
+            "goal": leg.problem.goal,
+            "status": leg.status.value,
+            "length": leg.length,
+            "lower_bound": leg.lower_bound,
+            "seconds": leg.seconds,
+        }
+        for leg in solution.legs
+    ]
 
 
 def route_record(solution: Solution) -> dict[str, Any]:
@@ -114,7 +129,7 @@ def route_record(solution: Solution) -> dict[str, Any]:
     with a georeference ``crs`` names that plane, and ``start_lonlat``, ``goal_lonlat`` and
     ``path_lonlat`` are longitude and latitude in degrees. ``unrefined_length`` is of the
     planner's own path where that was refined. ``contributions`` are the shares of the length
-    that the plane and each layer make up.
+    that the plane and each layer make up. ``legs`` are those of a tour.
     """
     problem, path = solution.problem, solution.path
     record: dict[str, Any] = {
@@ -130,6 +145,8 @@ def route_record(solution: Solution) -> dict[str, Any]:
         **provenance(solution),
         **_ends_in_degrees(solution),
     }
+    if solution.legs:
+        record["legs"] = _legs(solution)
     return dict(plain(record))
 
 
