@@ -26,7 +26,7 @@ from terrapath import certificate, proofs, scenes
 from terrapath._kernels import certificate as kernels
 from terrapath._kernels import surface_models, taylor
 from terrapath.bounding import Search, search_window
-from terrapath.certificate import seal_of
+from terrapath.certificate import fingerprint, seal_of
 from terrapath.geodesics import trace_ray
 from terrapath.lattice import Lattice
 from terrapath.proofs import Core
@@ -467,7 +467,7 @@ def test_the_margin_of_a_core_is_below_all_samples_of_its_edge_and_near(seed):
     core = Core(*(int(k) for k in core))
     anchor = oracles.Terrain(problem.surface).lift(np.array([problem.goal]))[0]
     shifted = anchor - np.concatenate([problem.start, np.zeros(len(anchor) - 2)])
-    margin = proofs.edge_margin(problem, made, core, shifted, factor)
+    margin = proofs.edge_margin(problem, made, proofs.End(core, problem.goal, shifted), factor)
     x = np.linspace(lattice.x[core.column0], lattice.x[core.column1], 401)
     y = np.linspace(lattice.y[core.row0], lattice.y[core.row1], 401)
     edge = np.concatenate(
@@ -796,7 +796,13 @@ def test_every_coefficient_is_under_the_seal(honest):
             replace(made, coefficients=up).check(problem)
 
 
+def next_to_flat(made):
+    """A function whose slopes' squares are no numbers above 0."""
+    return {"coefficients": 1e-170 * made.coefficients, "horizon": 1e-100, "norm": 1e-200}
+
+
 TIGHT = {
+    "next to flat": next_to_flat,
     "value up": lambda made: {"value": made.value * (1.0 + 1e-6)},
     "value up by a little": lambda made: {"value": made.value * (1.0 + 1e-10)},
     "norm down": lambda made: {"norm": made.norm * (1.0 - 1e-4)},
@@ -835,8 +841,113 @@ TIGHT = {
 @pytest.mark.parametrize("name", TIGHT)
 def test_a_sealed_forgery_is_rejected_by_the_mathematics(honest, name):
     problem, made = honest
-    with pytest.raises(tp.CertificateError, match=r"can be proven|does not hold"):
+    with pytest.raises(tp.CertificateError, match=r"can be proven|does not hold|norm at least"):
         resealed(made, **TIGHT[name](made)).check(problem)
+
+
+def sealed(problem, **claim):
+    """A certificate of somebody who knows how it is checked."""
+    made = certificate.Certificate(fingerprint=fingerprint(problem), **claim)
+    return replace(made, seal=seal_of(made))
+
+
+def test_what_counts_for_nothing_on_a_cores_edge_does_so_however_large():
+    # The coefficients of one column are seen from nowhere but the core's own edge, where their
+    # weight is 0, or was the cube of a rounding error.
+    surface = tp.Surface.from_peaks([[(1.0, 0.1, 5.0, 20.0)]])
+    problem = tp.Problem(surface, (0.0, 0.0), (10.0, 0.0), bounds=(-1.7, -128.0, 13.1, 128.0))
+    columns, rows = 34, 256
+    width = problem.bounds.width / columns
+    for column in range(6, 16):
+        at = problem.bounds.x1_min + column * width
+        error = 1.0 - ((at - problem.bounds.x1_min) / width - (column - 1))
+        if error != 0.0:
+            break
+    assert 0.0 < abs(error) < 1e-14
+    forged = np.zeros((rows + 3, columns + 3))
+    forged += np.interp(np.arange(columns + 3), [3, column - 1], [-384.0, 0.0])
+    height = np.maximum(124.0 - np.abs(np.arange(rows + 3) - 129.0), 0.0)
+    height[:3] = height[-3:] = 0.0
+    forged[:, column - 1] -= 6.0 * height / error**3
+    forgery = sealed(
+        problem,
+        value=122.0,
+        norm=1.0,
+        coefficients=forged,
+        bounds=problem.bounds,
+        horizon=1000.0,
+        start_core=Core(0, column, 0, rows),
+        goal_core=Core(columns - 12, columns - 2, rows // 2 - 2, rows // 2 + 2),
+    )
+    with pytest.raises(tp.CertificateError, match="can be proven"):
+        forgery.check(problem)
+
+
+def test_a_chord_that_overflows_proves_nothing():
+    cell = 5e153  # its square is a number, that of the chord from the step on is not
+    problem = tp.Problem(
+        tp.Surface.from_peaks([[]]),
+        (0.0, 0.0),
+        (40.0 * cell, 0.0),
+        (-5.0 * cell, -5.0 * cell, 45.0 * cell, 5.0 * cell),
+    )
+    step = np.where(np.arange(53) < 20, 0.0, 1e200)
+    forgery = sealed(
+        problem,
+        value=1e199,
+        norm=1.0,
+        coefficients=np.repeat(step[None], 13, axis=0),
+        bounds=problem.bounds,
+        horizon=1e200,
+        start_core=Core(4, 6, 4, 6),
+        goal_core=Core(44, 46, 4, 6),
+    )
+    with pytest.raises(tp.CertificateError, match="can be proven"):
+        forgery.check(problem)
+
+
+def test_rounded_layers_count_as_much_as_the_ground_around_costs():
+    # Heights so large that a chord is rounding, on dear ground, and cheap ground far off.
+    axis, length = np.arange(40.0), 1e-3
+    cost = np.ones((40, 40))
+    cost[36:, 36:] = 1e-9
+    ground = np.full((40, 40), 1e12)
+    surface = tp.Surface.from_grid(
+        np.stack([ground, cost]), axis, axis, kinds=["rise", "cost"], names=["h", "c"]
+    )
+    nodes, centre = 60, 30
+    for k in range(12):
+        start = (5.31 + 0.37 * k, 5.73 + 0.11 * k)
+        goal = (start[0] + length, start[1])
+        corner = (start[0] - 0.25 * length, start[1] - 0.5 * length)
+        bounds = (*corner, corner[0] + 1.5 * length, corner[1] + length)
+        problem = tp.Problem(surface, start, goal, bounds)
+        east = (np.arange(nodes + 3) - 1.0) * problem.bounds.width / nodes - 0.25 * length
+        forgery = sealed(
+            problem,
+            value=0.0,
+            norm=1.0 + 1e-8,
+            coefficients=np.repeat(east[None], nodes + 3, axis=0),
+            bounds=problem.bounds,
+            horizon=10.0 * length,
+            start_core=Core(8, 12, centre - 2, centre + 2),
+            goal_core=Core(48, 52, centre - 2, centre + 2),
+        )
+        proven = proofs.proven_value(problem, forgery, forgery.norm)
+        assert proven <= problem.path([start, goal]).length
+
+
+def test_a_goal_on_the_maps_edge_is_not_rounded_off_it():
+    start, goal = (-0.1, 0.0), (0.2, 0.0)
+    assert start[0] + (goal[0] - start[0]) > goal[0]
+    x, y = np.linspace(-12.0, goal[0], 30), np.linspace(-5.0, 5.0, 25)
+    cost = np.ones((25, 30)) + 0.1 * np.sin(x)
+    surface = tp.Surface.from_grid(
+        np.stack([np.zeros((25, 30)), cost]), x, y, kinds=["rise", "cost"], names=["h", "c"]
+    )
+    problem = tp.Problem(surface, start, goal)
+    assert problem.bounds.x1_max == goal[0]
+    assert tp.lower_bound(problem, length=40.0).check(problem) > 0.0
 
 
 def test_an_honest_certificate_may_claim_less(honest):
@@ -914,7 +1025,7 @@ def test_a_certificate_of_another_problem_is_rejected(name):
     # With the fingerprint forged as well, the shorter way there refutes it.
     forged = resealed(made, fingerprint=certificate.fingerprint(other))
     if name not in ("weight", "amplitude"):
-        with pytest.raises(tp.CertificateError, match=r"can be proven|does not hold"):
+        with pytest.raises(tp.CertificateError, match=r"can be proven|does not hold|norm at least"):
             forged.check(other)
 
 

@@ -316,6 +316,30 @@ def test_the_bound_comes_close_and_another_cost_breaks_it():
         found.check(cheaper)
 
 
+@pytest.mark.parametrize(
+    ("cost", "weight"), [(1e25, 1.0), (1e-19, 1.0), (100.0, 10.0), (1e-100, 1.0)]
+)
+def test_costs_beyond_single_precision_are_refused(cost, weight):
+    axis = np.arange(5.0)
+    values = np.stack([np.zeros((5, 5)), np.full((5, 5), cost)])
+    with pytest.raises(tp.InputError, match="the costs, to their weights, reach from 1e"):
+        tp.Surface.from_grid(
+            values, axis, axis, kinds=["rise", "cost"], names=["h", "c"], weights=[1.0, weight]
+        )
+
+
+@pytest.mark.parametrize("cost", [1e-12, 1e12])
+def test_costs_as_large_and_as_small_as_they_may_be_are_planned_on(cost):
+    axis = np.arange(20.0)
+    values = np.stack([np.zeros((20, 20)), np.full((20, 20), cost)])
+    surface = tp.Surface.from_grid(values, axis, axis, kinds=["rise", "cost"], names=["h", "c"])
+    problem = tp.Problem(surface, (3.0, 3.0), (15.0, 14.0))
+    solution = tp.plan(problem, "fast-marching", refine=True, bound=True)
+    truth = cost * math.dist(problem.start, problem.goal)
+    assert solution.length == pytest.approx(truth, rel=1e-6)
+    assert solution.certificate.check(problem) == pytest.approx(truth, rel=1e-6)
+
+
 # What the layers contribute
 
 

@@ -235,3 +235,12 @@ def test_a_callback_sees_what_optimal_does(problem):
     assert all(0 < p.samples <= p.total for p in searching)
     assert [p.stage for p in seen][-1] == PROVING
     assert seen[-1].best_cost == pytest.approx(TRUTH, rel=1e-7)
+
+
+def test_ends_so_close_that_nothing_is_proven_have_an_infinite_gap():
+    surface = tp.Surface.from_peaks([[(5.0, 0.1, 5.0, 5.0)]])
+    problem = tp.Problem(surface, (0.1 + 0.2, 0.0), (0.3, 0.0), bounds=(-1.0, -1.0, 11.0, 11.0))
+    for planner in ("optimal", "a-star"):
+        solution = tp.plan(problem, planner, bound=planner != "optimal")
+        assert solution.status is tp.Status.SOLVED
+        assert (solution.lower_bound, solution.gap) == (0.0, math.inf)

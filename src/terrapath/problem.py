@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import enum
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -320,11 +321,13 @@ class Solution:
 
     @property
     def gap(self) -> float | None:
-        """(length - lower_bound) / lower_bound."""
+        """(length - lower_bound) / lower_bound; infinite where nothing above 0 is proven."""
         if self.length is None or self.lower_bound is None:
             return None
         if self.length == self.lower_bound:
             return 0.0
+        if self.lower_bound == 0.0:
+            return math.inf
         return (self.length - self.lower_bound) / self.lower_bound
 
     @property

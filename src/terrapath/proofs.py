@@ -32,7 +32,8 @@ EPSILONS = 64.0
 # A norm is not proven any closer than this to what samples of it suggest.
 CLOSE = 3e-5
 
-# Nor below this, so that nothing overflows: a function that is steep nowhere proves nothing.
+# Nor below this: a function that is steep nowhere proves nothing, and squares of slopes far below
+# would be rounded to 0.
 FLATTEST = 1e-3
 
 Cells = npt.NDArray[np.bool_]
@@ -76,9 +77,11 @@ class Claim:
 def require_sound(claim: Claim) -> None:
     """Raise CertificateError where a number is none, or the coefficients are no spline's."""
     value, norm, horizon = claim.value, claim.norm, claim.horizon
-    if not (all(map(math.isfinite, (value, norm, horizon))) and norm > 0.0):
+    finite = all(map(math.isfinite, (value, norm, horizon)))
+    if not (finite and norm >= FLATTEST * (1.0 - ROUNDING)):
         raise CertificateError(
-            f"value={value}, norm={norm} and horizon={horizon} must be finite, the norm above 0"
+            f"value={value}, norm={norm} and horizon={horizon} must be finite, the norm at least "
+            f"{FLATTEST:g}"
         )
     shape, kind = claim.coefficients.shape, claim.coefficients.dtype
     if not (len(shape) == 2 and min(shape) >= 4 and kind == np.float64):
@@ -232,8 +235,16 @@ def proven_norm(problem: Problem, claim: Claim, found: Array, enough: float = 0.
     return float(norm) * (1.0 + ROUNDING)
 
 
-def _anchor(problem: Problem, claim: Claim, core: Core, end: Array) -> kernels.Anchor:
-    """An end of all paths, (2 + layers,) lifted, and what is sure of the ground around its core.
+class End(NamedTuple):
+    """An end of all paths."""
+
+    core: Core
+    place: tuple[float, float]  # on the map
+    lifted: Array  # (2 + layers,), the start being the origin of the plane
+
+
+def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
+    """An end, and what is sure of the ground around its core.
 
     The ground is the core and half as much again on all sides. A path of length s there, costs left
     out, has met no cost below c - G s, c being that at the end and G the steepest slope; so to
@@ -241,11 +252,11 @@ def _anchor(problem: Problem, claim: Claim, core: Core, end: Array) -> kernels.A
     """
     surface, data = problem.surface, problem.surface.data
     if not (surface.costs and isinstance(data, Spline)):
-        return kernels.Anchor(end, 1.0, math.inf)
-    x0, y0, x1, y1 = _extent(claim.lattice, core)
+        return kernels.Anchor(end.lifted, 1.0, math.inf)
+    x0, y0, x1, y1 = _extent(claim.lattice, end.core)
     width, height = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
     around = Bounds(x0 - width, y0 - height, x1 + width, y1 + height)
-    (x, y), bounds = np.array(problem.start) + end[:2], problem.bounds
+    (x, y), bounds = end.place, problem.bounds
     # Beyond the bounds no path can go.
     sides = (
         (x - around.x1_min, around.x1_min > bounds.x1_min),
@@ -257,28 +268,28 @@ def _anchor(problem: Problem, claim: Claim, core: Core, end: Array) -> kernels.A
     found, cost = span_within(data, around), float(surface.cost((x, y)))
     farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
     floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
-    return kernels.Anchor(end, floor, found.least * (1.0 - ROUNDING) * float(far))
+    return kernels.Anchor(end.lifted, floor, found.least * (1.0 - ROUNDING) * float(far))
 
 
-def edge_margin(problem: Problem, claim: Claim, core: Core, end: Array, factor: float) -> float:
-    """At most distance(end, p) + factor u(p) for all p on the edge of a core, map units.
+def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> float:
+    """At most distance(end, p) + factor u(p) for all p on the edge of its core, map units.
 
-    end (2 + layers,) : a lifted point, the start being the origin of the plane. The distance is
-    bounded by the chord and the least cost around.
+    The distance is bounded by the chord and the least cost around.
     """
-    return float(
-        kernels.margin_of_core(
-            _ground(problem).surface,
-            _bound(problem, claim),
-            _anchor(problem, claim, core, end),
-            float(factor),
-            core.column0,
-            core.column1,
-            core.row0,
-            core.row1,
-            _cutting(problem, claim.lattice),
-        )
+    surface, core = _ground(problem).surface, end.core
+    anchor = _anchor(problem, claim, end)
+    margin = kernels.margin_of_core(
+        surface,
+        _bound(problem, claim),
+        anchor,
+        float(factor),
+        core.column0,
+        core.column1,
+        core.row0,
+        core.row1,
+        _cutting(problem, claim.lattice),
     )
+    return float(margin) - anchor.floor * _doubt(surface)
 
 
 def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
@@ -295,10 +306,11 @@ def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
     if _overlap(claim.start_core, claim.goal_core):
         return straight
     detour = least * least_detour(problem, claim.bounds) * (1.0 - ROUNDING)
-    first = edge_margin(problem, claim, claim.start_core, start, -1.0 / norm)
-    last = edge_margin(problem, claim, claim.goal_core, goal, 1.0 / norm)
-    rest = min(last, claim.horizon / norm)
-    within = first + rest - ROUNDING * (abs(first) + abs(rest)) - least * doubt
+    ends = End(claim.start_core, problem.start, start), End(claim.goal_core, problem.goal, goal)
+    first = edge_margin(problem, claim, ends[0], -1.0 / norm)
+    last = edge_margin(problem, claim, ends[1], 1.0 / norm)
+    rest = min(last, claim.horizon / norm - least * doubt)
+    within = first + rest - ROUNDING * (abs(first) + abs(rest))
     # No number, where something overflowed.
     return max(min(within, detour), straight) if within > straight else straight
 

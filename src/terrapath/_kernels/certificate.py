@@ -34,14 +34,24 @@ class Bound(NamedTuple):
 
 
 @inner_kernel
+def share_of_cell(share, half):
+    """The share of its cell at which a box has its centre, exact for a box on the cell's side.
+
+    There one of four coefficients counts for nothing. The cube of a rounding error would let
+    it count, and it may be as large as somebody likes where no cell depends on it.
+    """
+    return math.floor(share + 0.5) if half == 0.0 else share
+
+
+@inner_kernel
 def bound_over(bound, i, j, box):
-    """Models of u and its slopes over a box inside cell (i, j)."""
+    """Models of u and its slopes over a box inside cell (i, j), or on a side of it."""
     return spline_models(
         bound.coefficients,
         i,
         j,
-        (box.x - bound.x0) / bound.dx - i,
-        (box.y - bound.y0) / bound.dy - j,
+        share_of_cell((box.x - bound.x0) / bound.dx - i, box.a),
+        share_of_cell((box.y - bound.y0) / bound.dy - j, box.b),
         box.a / bound.dx,
         box.b / bound.dy,
         bound.dx,
@@ -151,7 +161,7 @@ def need_of_box(facts, horizon):
     way_out = math.inf
     if short <= 0.0:
         way_out = 0.0
-    elif short < math.inf and facts.chord > 0.0:
+    elif short < math.inf and 0.0 < facts.chord < math.inf:
         way_out = short / facts.chord
     return Need(min(slope, way_out), min(likely, way_out), likely)
 

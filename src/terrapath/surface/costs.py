@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._kernels.surfaces import Spline
+from .._kernels.surfaces import Peaks, Spline
 from ..errors import InputError
 from ..validation import Array, Bounds
 
@@ -22,6 +22,24 @@ def require_costs(values: Array, x: Array, y: Array, names: Sequence[str]) -> No
             f"cost {names[k]!r} is {values[k, j, i]:g} at x1={x[i]:.10g}, x2={y[j]:.10g} and not "
             f"above 0 in {len(bad)} cells; a cost multiplies lengths, so block what is forbidden "
             "and give the rest a cost above 0"
+        )
+
+
+# Squares of costs within this are numbers in single precision, too.
+LARGEST_COST = 1e12
+
+
+def require_cost_range(data: Peaks | Spline) -> None:
+    """Raise InputError where the product of all costs is beyond 1e-12 to 1e12."""
+    logs = data.log_cost if isinstance(data, Spline) else np.empty(0)
+    if not logs.size:
+        return
+    low, high, most = float(logs.min()), float(logs.max()), math.log(LARGEST_COST)
+    if not -most <= low <= high <= most:
+        raise InputError(
+            f"the costs, to their weights, reach from 1e{low / math.log(10):.3g} to "
+            f"1e{high / math.log(10):.3g}, beyond {1.0 / LARGEST_COST:g} to {LARGEST_COST:g}; "
+            "scale them, or lower their weights"
         )
 
 

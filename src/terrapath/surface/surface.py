@@ -22,7 +22,7 @@ from ..validation import (
     require_positive,
 )
 from .blocks import blocks
-from .costs import limited, require_costs, with_costs
+from .costs import limited, require_cost_range, require_costs, with_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
 from .layers import Layer, make_layers, weights_of
@@ -106,6 +106,7 @@ class Surface:
                 f"the surface has slopes of up to {steepest:.2g}, over {STEEPEST:g}; check the "
                 "units and the weights, and whether a no-data value is not declared as such"
             )
+        require_cost_range(self.data)
 
     # Making one
 
