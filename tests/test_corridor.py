@@ -211,6 +211,7 @@ def test_the_command_plans_large_maps_in_a_corridor(
     shown = " ".join(capsys.readouterr().out.split())
     assert "no path in the corridor is shorter" in shown
     assert "planned on the map read 5 times coarser" in shown
+    assert "keep-in area" not in shown  # nobody asked for one
     properties = json.loads((tmp_path / "r.geojson").read_text())["features"][0]["properties"]
     assert properties["bound_holds"] == "in the corridor"
 
@@ -240,3 +241,11 @@ def test_a_corridor_has_a_width(small_limits):
     rough = PLANNER.solve(read(Part(decimate=5)))
     with pytest.raises(InputError, match="corridor=0"):
         Corridor(rough, 0.0, 5)
+
+
+def test_a_start_that_is_missing_has_nothing_to_do_with_the_coarse_map(
+    small_limits, tmp_path, capsys
+):
+    write_map(tmp_path / "map.tif", "EPSG:32633", UTM)
+    assert run(["plan", str(tmp_path / "map.tif"), "--goal", "502600,5002400"]) == 2
+    assert capsys.readouterr().err.startswith("terrapath: start is missing")

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import tomllib
+import zipfile
 from pathlib import Path
 
 import geopandas
@@ -447,6 +448,27 @@ def test_the_scenario_of_a_map_plans_as_it_stands_from_anywhere(folder, capsys, 
     answer = answer_of(capsys, folder / "a.toml", *QUICK)
     assert answer["status"] == "solved"
     assert np.hypot(*np.subtract(answer["start"], answer["goal"])) > 400.0
+
+
+def test_the_scenario_of_a_map_in_an_archive_names_it_as_gdal_does(folder, capsys):
+    with zipfile.ZipFile("maps.zip", "w") as archive:
+        archive.write("../maps/dem.tif", "dem.tif")
+    name = f"/vsizip/{Path('maps.zip').resolve()}/dem.tif"
+    assert run(["init", name, "--output", "a.toml"]) == 0
+    assert capsys.readouterr().err == ""
+    assert read_scenario("a.toml").map.path == name
+    assert answer_of(capsys, "a.toml", *QUICK)["status"] == "solved"
+
+
+def test_a_map_without_a_crs_is_given_one(folder, capsys):
+    with rasterio.open("../maps/dem.tif") as dataset:
+        profile, values = dataset.profile, dataset.read(2)
+    with rasterio.open("bare.tif", "w", **{**profile, "count": 1, "crs": None}) as dataset:
+        dataset.write(values, 1)
+    assert run(["init", "bare.tif", "--crs", "EPSG:32632"]) == 0
+    assert read_scenario("bare.toml").map.crs == "EPSG:32632"
+    capsys.readouterr()
+    assert answer_of(capsys, "bare.toml", *QUICK)["crs"] == "EPSG:32632"
 
 
 def test_every_key_stands_in_a_written_scenario_and_can_be_switched_on(folder, capsys):

@@ -15,7 +15,7 @@ import shapely
 
 from . import metric
 from ._kernels.surfaces import Spline
-from .errors import InputError
+from .errors import BlockedError, InputError, OutsideSurfaceError
 from .planners import FastMarching, Finished, plan_tour
 from .planners.base import Callback, Planner, Progress
 from .problem import Problem, Solution, Status
@@ -137,7 +137,7 @@ def factor(cells: float, most: int) -> int:
 def _coarse(pose: Pose, decimate: int, callback: Callback | None) -> Solution:
     try:
         problem, via = pose(Part(decimate=decimate))
-    except InputError as error:
+    except (BlockedError, OutsideSurfaceError) as error:
         raise InputError(
             f"on the map read {decimate} times coarser: {error}; or plan on all of it at once "
             "with --corridor none"

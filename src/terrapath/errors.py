@@ -13,6 +13,10 @@ class OutsideSurfaceError(InputError):
     """A point where the surface is not defined."""
 
 
+class BlockedError(InputError):
+    """A point that no path can be at."""
+
+
 class FitError(InputError):
     """A function that no spline of a reasonable size follows to the asked tolerance."""
 

@@ -15,7 +15,7 @@ import shapely
 
 from . import metric
 from .clearance import Constraints, outside_of
-from .errors import InputError, OutsideSurfaceError
+from .errors import BlockedError, InputError, OutsideSurfaceError
 from .free_space import Obstacle
 from .lattice import default_spacing
 from .steepness import Steepness
@@ -109,7 +109,7 @@ class Problem:
             return point
         blocker = self.constraints.blocker(point, self.surface.unit)
         shown = f"{name}=({point[0]:.10g}, {point[1]:.10g})"
-        raise InputError(f"{shown} is {blocker}; move it to free ground")
+        raise BlockedError(f"{shown} is {blocker}; move it to free ground")
 
     def between(self, start: Any, goal: Any, names: tuple[str, str] = ("start", "goal")) -> Problem:
         """The same ground with another start and goal, which errors call by ``names``."""

@@ -20,6 +20,10 @@ def init_command(
         Path | None,
         typer.Option(metavar="FILE", help="The scenario file, .toml [default: named as the map]."),
     ] = None,
+    crs: Annotated[
+        str | None,
+        typer.Option(metavar="CRS", help="CRS of a map that names none, as EPSG:32617."),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Take the place of a file that exists.")
     ] = False,
@@ -38,7 +42,7 @@ def init_command(
     require_writable(file)
     if file.exists() and not force:
         raise InputError(f"{file} exists; name another by --output, or give --force to replace it")
-    text = scenario_of_scene(where) if where in SCENES else scenario_of_map(Path(where), file)
+    text = scenario_of_scene(where) if where in SCENES else scenario_of_map(where, file, crs)
     with written_whole(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
     typer.echo(f"{file} is written; plan it by: terrapath plan {file}")

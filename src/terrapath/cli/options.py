@@ -83,7 +83,9 @@ def _parse_extent(text: str, option: str) -> Extent:
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"{option} {text!r} is not a length; give metres, auto or none") from None
+        raise InputError(
+            f"{option} {text!r} is not a length; give one in map units, auto or none"
+        ) from None
 
 
 def _is_flag(declaration: Declared) -> bool:

@@ -97,7 +97,7 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     for layer in surface.costs:
         yield f"cost {layer.name}", _exponent(layer)
     yield from _corridor(solution)
-    yield from _constraints(problem)
+    yield from _constraints(solution)
     yield from _lengths(solution, target_gap)
     yield "samples", f"{solution.samples:,}"
     yield "seconds", f"{solution.seconds:.3f}"
@@ -169,16 +169,17 @@ def _contributions(path: Path) -> Iterator[tuple[str, str]]:
     yield "length made of", ", ".join(parts)
 
 
-def _constraints(problem: Problem) -> Iterator[tuple[str, str]]:
+def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
     """What the route has to mind besides the edge of the map."""
-    unit = problem.surface.unit
+    problem, unit = solution.problem, solution.problem.surface.unit
     if problem.obstacles:
         yield "obstacles", f"{len(problem.obstacles):,}"
     if problem.radius:
         yield "vehicle radius", _amount(problem.radius, unit) + ", kept from everything blocked"
     if problem.max_slope is not None:
         yield "steepest ground", f"{problem.max_slope:g} degrees"
-    if problem.keep_in is not None:
+    # In a corridor the area is the corridor's, which is told already.
+    if problem.keep_in is not None and solution.corridor is None:
         yield "keep-in area", f"{problem.keep_in.area:,.6g} {unit}^2" if unit else "given"
 
 

@@ -102,7 +102,7 @@ class View:
         if found is None:
             extent = ", ".join(f"{value:.10g}" for value in self.band.grid.extent())
             raise MapError(
-                f"within={tuple(bounds)} does not touch {self.band.label}, which covers ({extent}) "
+                f"{tuple(bounds)} does not touch {self.band.label}, which covers ({extent}) "
                 "as (x_min, y_min, x_max, y_max); check the order and the CRS"
             )
         return found
@@ -119,8 +119,9 @@ class View:
             factor = math.ceil(self.factor * math.sqrt(grid.rows * grid.columns / most_cells))
             raise MapError(
                 f"{self.band.label} has {grid.columns:,} x {grid.rows:,} cells, more than "
-                f"{most_cells:,}; read a part of it with within=(x_min, y_min, x_max, y_max), or "
-                f"all of it coarser with decimate={factor}"
+                f"{most_cells:,}; read a part of it, in Python by within=(x_min, y_min, x_max, "
+                f"y_max) and on the command line by --bounds, or all of it coarser, in Python by "
+                f"decimate={factor}"
             )
 
     def _strips(self) -> Iterator[tuple[int, Array]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import os
 import re
 import textwrap
@@ -27,6 +28,8 @@ DERIVED_WORDS = ("slope", "aspect", "rough", "shade", "curvature", "error", "cou
 # Guessed ends lie on a grid of so many places a side, from corner to corner.
 PLACES = 9
 WIDTH = 88
+# On a larger map ends are guessed on means of its cells.
+MOST_CELLS = 16_000_000
 
 Values = Mapping[tuple[str, str], str]
 
@@ -53,36 +56,42 @@ def scenario_of_scene(name: str) -> str:
     return _template(values, f"the built-in scene {name}", [])
 
 
-def scenario_of_map(path: Path, file: Path) -> str:
+def scenario_of_map(where: str, file: Path, crs: str | None = None) -> str:
     """The text of a scenario of a raster, to be written into ``file``.
 
-    Start and goal are guessed: free places far from one another that a way connects.
+    where : a file, or what GDAL reads under that name. crs : of a raster that names none. Start
+    and goal are guessed: free places far from one another that a way connects.
     Raises MapError where the raster cannot be read, or has no two such places.
     """
-    from .maps import read_surface
+    from .maps import count_cells, read_surface
 
-    if not path.exists() and not path.suffix:
-        raise InputError(
-            f"{str(path)!r} is neither a built-in scene ({', '.join(names())}) nor a file"
-        )
-    bands = _bands(path)
+    path = Path(where)
+    if not path.exists() and not path.suffix and ":" not in where:
+        raise InputError(f"{where!r} is neither a built-in scene ({', '.join(names())}) nor a file")
+    bands = _bands(where)
     height = _height_band(bands)
-    surface = read_surface(path, height_band=height)
-    beside = os.path.relpath(path, file.parent)
+    cells = count_cells(where, height_band=height, crs=crs)
+    coarser = math.ceil(math.sqrt(cells / MOST_CELLS)) or 1
+    surface = read_surface(where, height_band=height, crs=crs, decimate=coarser)
+    seen = Path(os.path.relpath(path, file.parent)).as_posix() if path.exists() else where
     values = {
-        ("map", "path"): _text(Path(beside).as_posix()),
+        ("map", "path"): _text(seen),
         ("map", "height_band"): str(height),
         **_ends(surface, _guess(surface)),
     }
-    return _template(values, path.name, _band_lines(bands, height, Path(beside).as_posix()))
+    if crs is not None:
+        values["map", "crs"] = _text(crs)
+    return _template(values, path.name, _band_lines(bands, height, seen))
 
 
-def _bands(path: Path) -> list[Band]:
+def _bands(where: str) -> list[Band]:
     import rasterio
     from rasterio.errors import RasterioError
 
+    from .rasters import gdal
+
     try:
-        with rasterio.open(path) as dataset:
+        with gdal(), rasterio.open(where) as dataset:
             described = zip(dataset.descriptions, dataset.units, strict=True)
             return [Band(k, d or "", u or "") for k, (d, u) in enumerate(described, start=1)]
     except (RasterioError, OSError):

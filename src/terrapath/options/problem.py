@@ -85,7 +85,7 @@ class MapSection:
             "Smooth over this length (standard deviation, map units); auto is the least that "
             "heights rounded to a step need [default], none leaves the map as it is.",
             'a finite number, "auto" or "none"',
-            form="METRES|auto|none",
+            form="LENGTH|auto|none",
         ),
     ] = "auto"
     crs: Annotated[

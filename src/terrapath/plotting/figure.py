@@ -89,7 +89,7 @@ def draw_profile(solution: Solution) -> Any:
 def require_known_picture(path: Path) -> None:
     """Raise MapError for an ending that is no picture format."""
     if path.suffix.lower() not in FORMATS:
-        raise MapError(f"plot={str(path)!r} has no known format; end it in {', '.join(FORMATS)}")
+        raise MapError(f"{path} has no known picture format; end it in {', '.join(FORMATS)}")
 
 
 def plot_route(solution: Solution, path: str | Path) -> None:
