@@ -513,10 +513,12 @@ def test_files_that_are_no_certificates_give_one_clear_line(proof, tmp_path, cap
     whole[len(whole) // 2] ^= 255
     flipped.write_bytes(whole)
     np.savez(tmp_path / "other.npz", values=np.zeros(3))
-    for name in ("text", "half", "flipped", "other", "missing"):
+    for name in ("text", "half", "flipped", "other"):
         path = str(tmp_path / f"{name}.npz")
         refused(capsys, "check", ["one-peak", path, "--goal", "9,8"], name, "not a certificate")
     refused(capsys, "check", ["one-peak", str(tmp_path), "--goal", "9,8"], "not a certificate")
+    missing = str(tmp_path / "missing.npz")
+    refused(capsys, "check", ["one-peak", missing, "--goal", "9,8"], "missing.npz does not exist")
     refused(capsys, "check", ["one-peak"], "CERTIFICATE")
 
 
