@@ -7,9 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import geopandas
 import numpy as np
 import pytest
 import rasterio
+import shapely
 from rasterio.transform import from_origin
 
 import terrapath as tp
@@ -296,6 +298,73 @@ def test_an_existing_file_survives_a_refused_command(tmp_path, capsys):
     kept.write_text("precious")
     bad(capsys, ["six-peaks", "--output", str(kept), "--start", "99,99"], "start=(99, 99)")
     assert kept.read_text() == "precious"
+
+
+@pytest.fixture
+def project(dem, monkeypatch):
+    """A folder with a map, and a GeoPackage of two layers, that nothing changes."""
+    monkeypatch.chdir(dem.parent)
+    lake = geopandas.GeoSeries([shapely.box(500_200, 4_000_150, 500_260, 4_000_260)], crs=32617)
+    for layer in ("lakes", "area"):
+        lake.to_file("project.gpkg", layer=layer)
+    Path("bag.bag2").mkdir()
+    Path("bag.bag2/metadata.yaml").touch()
+    Path("bag.bag2/dem.tif").write_bytes(dem.read_bytes())
+    Path("link.gpkg").symlink_to("project.gpkg")
+    before = {path: path.read_bytes() for path in dem.parent.rglob("*") if path.is_file()}
+    yield dem.parent
+    after = {path: path.read_bytes() for path in dem.parent.rglob("*") if path.is_file()}
+    assert {path: after.get(path) for path in before} == before
+
+
+REPLACED = {
+    "a layer's file": ["--obstacles", "project.gpkg:lakes", "--output", "project.gpkg"],
+    "obstacles": ["--obstacles", "project.gpkg", "--output", "../{here}/project.gpkg"],
+    "the second of them": [
+        *("--obstacles", "link.gpkg", "--obstacles", "dem.tif"),
+        *("--output", "a.csv", "--output", "project.gpkg"),
+    ],
+    "by a link": ["--obstacles", "project.gpkg:lakes", "--output", "link.gpkg"],
+    "the area to keep in": ["--keep-in", "project.gpkg:area", "--output", "project.gpkg"],
+    "a layer by GDAL's name": ["--layer", "a=GPKG:project.gpkg:a", "--output", "project.gpkg"],
+    "a cost in quotes": ["--cost", 'a=GPKG:"project.gpkg":a', "--output", "project.gpkg"],
+    "a folder with an input": ["--layer", "rocks=bag.bag2/dem.tif:2", "--output", "bag.bag2"],
+}
+
+
+@pytest.mark.parametrize("name", REPLACED)
+def test_no_output_replaces_an_input(name, project, capsys):
+    asked = [text.format(here=project.name) for text in REPLACED[name]]
+    bad(capsys, ["dem.tif", *ENDS, *FAST, *asked], asked[-1], "would replace the input", "another")
+    assert not Path("a.csv").exists()
+
+
+def test_no_output_of_a_scenario_replaces_an_input_of_it(project, capsys, monkeypatch):
+    Path("a.toml").write_text(
+        '[map]\npath = "dem.tif"\n[route]\nstart = [500100, 4000100]\ngoal = [500400, 4000300]\n'
+        '[constraints]\nobstacles = ["project.gpkg:lakes"]\n[output]\nfiles = ["project.gpkg"]\n'
+    )
+    monkeypatch.chdir("/")
+    bad(capsys, [str(project / "a.toml")], "project.gpkg", "would replace the input", "another")
+
+
+def test_no_field_replaces_its_map(project, capsys):
+    for output in ("dem.tif", str(project / "dem.tif")):
+        asked = ["dem.tif", "--start", "500100,4000100", "--output", output]
+        refused(capsys, "field", asked, repr(output), "would replace the input 'dem.tif'")
+    Path("dem.toml").write_bytes(Path("dem.tif").read_bytes())
+    refused(capsys, "init", ["dem.toml", "--force"], "would replace the input 'dem.toml'")
+
+
+def test_an_output_beside_the_inputs_is_written(project, capsys):
+    asked = ["dem.tif", *ENDS, *FAST, *RAW, "--obstacles", "project.gpkg:lakes"]
+    for _ in range(2):
+        assert json_of(capsys, *asked, "--output", "lakes.gpkg", "--output", "dem.csv")[0] == 0
+    assert Path("lakes.gpkg").exists()
+
+
+def test_one_file_by_two_names_is_named_twice(project, capsys):
+    bad(capsys, ["one-peak", "--output", "a.csv", "--output", f"../{project.name}/a.csv"], "twice")
 
 
 def test_no_path_within_the_limits_exits_with_3_and_writes_nothing(tmp_path, capsys):

@@ -143,7 +143,7 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
     planner = _planner(scenario)
     output, route = scenario.output, scenario.route
     outputs = RouteOutputs(output, len(route.via) + 1)
-    outputs.check()
+    outputs.check([where, *scenario.inputs()])
     question, quiet = Question(scenario), output.quiet or output.json
     with compiling_told(quiet):
         if is_planned_in_corridor(scenario, cells := question.cells()):
