@@ -50,7 +50,7 @@ def check_command(
     """Prove a lower bound again, from nothing but the problem and its certificate.
 
     Give the problem's options as they were given to `terrapath plan`. Exit codes: 0 it holds,
-    2 it does not, or is no certificate of this problem.
+    2 it does not, or is no certificate of this problem, 5 standard output is closed or full.
     """
     from ..certificate import Certificate
 

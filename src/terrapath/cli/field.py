@@ -75,7 +75,8 @@ def field_command(
     """Compute the distance field: the least length from the start to every node of a lattice.
 
     Of a scenario file only the map, the start, the bounds, the constraints and the spacing
-    count. Exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written).
+    count. Exit codes: 0 done, 2 bad input, 5 standard output is closed or full (all files are
+    written), 130 interrupted (nothing is written).
     """
     scenario = scenario_of(where, given)
     outputs = Outputs(output or [], plot)
@@ -87,6 +88,9 @@ def field_command(
         problem = Question(scenario).problem_to_itself()
         started = time.perf_counter()
         field = field_of(problem, spacing=scenario.planner.spacing)
-    print_field(problem, field, time.perf_counter() - started)
-    outputs.write(field)
+    seconds = time.perf_counter() - started
+    try:
+        print_field(problem, field, seconds)
+    finally:
+        outputs.write(field)
     return ExitCode.SOLVED
