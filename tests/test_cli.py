@@ -7,9 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import geopandas
 import numpy as np
 import pytest
 import rasterio
+import shapely
 from rasterio.transform import from_origin
 
 import terrapath as tp
@@ -298,6 +300,73 @@ def test_an_existing_file_survives_a_refused_command(tmp_path, capsys):
     assert kept.read_text() == "precious"
 
 
+@pytest.fixture
+def project(dem, monkeypatch):
+    """A folder with a map, and a GeoPackage of two layers, that nothing changes."""
+    monkeypatch.chdir(dem.parent)
+    lake = geopandas.GeoSeries([shapely.box(500_200, 4_000_150, 500_260, 4_000_260)], crs=32617)
+    for layer in ("lakes", "area"):
+        lake.to_file("project.gpkg", layer=layer)
+    Path("bag.bag2").mkdir()
+    Path("bag.bag2/metadata.yaml").touch()
+    Path("bag.bag2/dem.tif").write_bytes(dem.read_bytes())
+    Path("link.gpkg").symlink_to("project.gpkg")
+    before = {path: path.read_bytes() for path in dem.parent.rglob("*") if path.is_file()}
+    yield dem.parent
+    after = {path: path.read_bytes() for path in dem.parent.rglob("*") if path.is_file()}
+    assert {path: after.get(path) for path in before} == before
+
+
+REPLACED = {
+    "a layer's file": ["--obstacles", "project.gpkg:lakes", "--output", "project.gpkg"],
+    "obstacles": ["--obstacles", "project.gpkg", "--output", "../{here}/project.gpkg"],
+    "the second of them": [
+        *("--obstacles", "link.gpkg", "--obstacles", "dem.tif"),
+        *("--output", "a.csv", "--output", "project.gpkg"),
+    ],
+    "by a link": ["--obstacles", "project.gpkg:lakes", "--output", "link.gpkg"],
+    "the area to keep in": ["--keep-in", "project.gpkg:area", "--output", "project.gpkg"],
+    "a layer by GDAL's name": ["--layer", "a=GPKG:project.gpkg:a", "--output", "project.gpkg"],
+    "a cost in quotes": ["--cost", 'a=GPKG:"project.gpkg":a', "--output", "project.gpkg"],
+    "a folder with an input": ["--layer", "rocks=bag.bag2/dem.tif:2", "--output", "bag.bag2"],
+}
+
+
+@pytest.mark.parametrize("name", REPLACED)
+def test_no_output_replaces_an_input(name, project, capsys):
+    asked = [text.format(here=project.name) for text in REPLACED[name]]
+    bad(capsys, ["dem.tif", *ENDS, *FAST, *asked], asked[-1], "would replace the input", "another")
+    assert not Path("a.csv").exists()
+
+
+def test_no_output_of_a_scenario_replaces_an_input_of_it(project, capsys, monkeypatch):
+    Path("a.toml").write_text(
+        '[map]\npath = "dem.tif"\n[route]\nstart = [500100, 4000100]\ngoal = [500400, 4000300]\n'
+        '[constraints]\nobstacles = ["project.gpkg:lakes"]\n[output]\nfiles = ["project.gpkg"]\n'
+    )
+    monkeypatch.chdir("/")
+    bad(capsys, [str(project / "a.toml")], "project.gpkg", "would replace the input", "another")
+
+
+def test_no_field_replaces_its_map(project, capsys):
+    for output in ("dem.tif", str(project / "dem.tif")):
+        asked = ["dem.tif", "--start", "500100,4000100", "--output", output]
+        refused(capsys, "field", asked, repr(output), "would replace the input 'dem.tif'")
+    Path("dem.toml").write_bytes(Path("dem.tif").read_bytes())
+    refused(capsys, "init", ["dem.toml", "--force"], "would replace the input 'dem.toml'")
+
+
+def test_an_output_beside_the_inputs_is_written(project, capsys):
+    asked = ["dem.tif", *ENDS, *FAST, *RAW, "--obstacles", "project.gpkg:lakes"]
+    for _ in range(2):
+        assert json_of(capsys, *asked, "--output", "lakes.gpkg", "--output", "dem.csv")[0] == 0
+    assert Path("lakes.gpkg").exists()
+
+
+def test_one_file_by_two_names_is_named_twice(project, capsys):
+    bad(capsys, ["one-peak", "--output", "a.csv", "--output", f"../{project.name}/a.csv"], "twice")
+
+
 def test_no_path_within_the_limits_exits_with_3_and_writes_nothing(tmp_path, capsys):
     output = tmp_path / "a.geojson"
     arguments = ["six-peaks", "--samples", "20", "--step", "0.1", "--output", str(output)]
@@ -513,10 +582,12 @@ def test_files_that_are_no_certificates_give_one_clear_line(proof, tmp_path, cap
     whole[len(whole) // 2] ^= 255
     flipped.write_bytes(whole)
     np.savez(tmp_path / "other.npz", values=np.zeros(3))
-    for name in ("text", "half", "flipped", "other", "missing"):
+    for name in ("text", "half", "flipped", "other"):
         path = str(tmp_path / f"{name}.npz")
         refused(capsys, "check", ["one-peak", path, "--goal", "9,8"], name, "not a certificate")
     refused(capsys, "check", ["one-peak", str(tmp_path), "--goal", "9,8"], "not a certificate")
+    missing = str(tmp_path / "missing.npz")
+    refused(capsys, "check", ["one-peak", missing, "--goal", "9,8"], "missing.npz does not exist")
     refused(capsys, "check", ["one-peak"], "CERTIFICATE")
 
 
@@ -571,6 +642,88 @@ def test_bad_questions_about_a_field_give_one_clear_line(name, capsys, tmp_path,
     arguments, *words = BAD_FIELDS[name]
     refused(capsys, "field", arguments, *words)
     assert list(tmp_path.iterdir()) == []
+
+
+# Standard output that nobody reads, or no disk takes
+
+
+@pytest.fixture(params=["closed", "full"])
+def lost_output(request):
+    """A file descriptor that takes nothing."""
+    if request.param == "closed":
+        reading, writing = os.pipe()
+        os.close(reading)
+    elif not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full")
+    else:
+        writing = os.open("/dev/full", os.O_WRONLY)
+    yield writing
+    os.close(writing)
+
+
+def command(*arguments, **streams):
+    """The command in a process of its own, as the installed script runs it."""
+    program = "from terrapath.cli import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams},
+        text=True,
+        check=False,
+    )
+
+
+ROUTE = ["plan", "one-peak", *FAST, *RAW]
+SHOWN = {
+    "a table": (ROUTE, "--output", "route.csv"),
+    "JSON": ([*ROUTE, "--json"], "--output", "route.csv"),
+    "a field": (["field", "one-peak", "--spacing", "0.5"], "--output", "field.npz"),
+    "a scenario": (["init", "one-peak"], "--output", "one-peak.toml"),
+}
+
+
+@pytest.mark.parametrize("what", SHOWN)
+def test_files_are_written_although_nothing_can_be_shown(what, lost_output, tmp_path):
+    arguments, option, name = SHOWN[what]
+    done = command(*arguments, option, tmp_path / name, stdout=lost_output)
+    assert done.returncode == 5
+    assert done.stderr.startswith("terrapath: standard output cannot be written: ")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["scenes"], ["schema"]])
+def test_what_is_only_shown_and_cannot_be_exits_with_5(arguments, lost_output):
+    done = command(*arguments, stdout=lost_output)
+    assert (done.returncode, done.stderr.count("\n")) == (5, 1), done.stderr
+
+
+def test_unbuffered_output_that_is_lost_is_told_as_well(lost_output, tmp_path):
+    unbuffered = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    done = command(*ROUTE, "--output", tmp_path / "route.csv", stdout=lost_output, env=unbuffered)
+    assert (done.returncode, done.stderr.count("\n")) == (5, 1), done.stderr
+    assert (tmp_path / "route.csv").exists()
+
+
+def test_exit_codes_are_the_same_where_standard_error_is_lost(lost_output, tmp_path):
+    assert command("plan", "nowhere", stderr=lost_output).returncode == 2
+    few = ["--samples", "20", "--step", "0.1"]
+    assert command("plan", "six-peaks", *few, stderr=lost_output).returncode == 3
+    both = command(
+        *ROUTE, "--output", tmp_path / "route.csv", stdout=lost_output, stderr=lost_output
+    )
+    assert both.returncode == 5
+    assert (tmp_path / "route.csv").exists()
+
+
+def test_a_full_disk_loses_no_answer(tmp_path, capsys, monkeypatch):
+    def fail(*_, **__):
+        raise tp.MapError("route.csv could not be written: No space left on device")
+
+    monkeypatch.setattr("terrapath.io.write_route", fail)
+    assert run([*ROUTE, "--output", str(tmp_path / "route.csv")]) == 2
+    captured = capsys.readouterr()
+    assert "true length" in captured.out
+    assert "No space left" in captured.err
 
 
 def test_scenes_lists_every_scene(capsys):

@@ -391,6 +391,17 @@ def test_bands_of_an_array_are_counted_from_1():
             tp.read_surface(bands, height_band=band)
 
 
+@pytest.mark.parametrize("band", [0, 2, "height"])
+def test_of_values_and_coordinates_there_is_one_band(band):
+    map_of_one = (HEIGHTS, np.arange(10.0), np.arange(12.0))
+    with pytest.raises(tp.MapError, match=f"band={band!r} is not in the array; it has 1"):
+        tp.read_surface(map_of_one, height_band=band)
+    with pytest.raises(tp.MapError, match=f"band={band!r} is not in the array; it has 1"):
+        tp.read_surface(map_of_one, layers={"rocks": tp.LayerSource(map_of_one, band)})
+    layered = tp.read_surface(map_of_one, layers={"rocks": tp.LayerSource(map_of_one)})
+    assert [layer.name for layer in layered.layers] == ["height", "rocks"]
+
+
 def array_with(**changes):
     given = {
         "data": HEIGHTS,

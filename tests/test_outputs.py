@@ -205,6 +205,37 @@ def test_a_full_disk_is_told_in_one_line(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_missing_folder_is_told_in_one_line_that_names_the_output(tmp_path):
+    place = tmp_path / "no" / "such.csv"
+    with pytest.raises(tp.MapError, match=r"such\.csv could not be written: No such file"):
+        write_text(place)
+
+
+def write_text(path):
+    with written_whole(path) as temporary:
+        temporary.write_text("new")
+
+
+def test_a_name_of_any_length_that_a_file_can_have_is_written(tmp_path):
+    longest = tmp_path / ("a" * 251 + ".csv")
+    require_writable(longest)
+    write_text(longest)
+    assert longest.read_text() == "new"
+    longer = tmp_path / ("a" * 252 + ".csv")
+    with pytest.raises(tp.MapError, match="cannot be written: File name too long"):
+        require_writable(longer)
+    with pytest.raises(tp.MapError, match="could not be written: File name too long"):
+        write_text(longer)
+    assert [path.name for path in tmp_path.iterdir()] == [longest.name]
+
+
+def test_a_folder_in_the_place_of_an_output_is_told_in_one_line(tmp_path):
+    (tmp_path / "route.csv").mkdir()
+    with pytest.raises(tp.MapError, match=r"route\.csv could not be written"):
+        write_text(tmp_path / "route.csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["route.csv"]
+
+
 def test_looking_whether_a_file_can_be_written_leaves_nothing(tmp_path):
     require_writable(tmp_path / "new.csv")
     assert list(tmp_path.iterdir()) == []

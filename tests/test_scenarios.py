@@ -19,6 +19,7 @@ import terrapath as tp
 from terrapath.cli.main import app, run
 from terrapath.errors import InputError
 from terrapath.io.scenario import read_scenario, scenario_schema
+from terrapath.io.vectors.layers import read_layers
 from terrapath.options.listing import options
 from terrapath.options.problem import LayerTable
 from terrapath.options.scenario import Scenario
@@ -189,6 +190,64 @@ def test_values_are_read_as_they_stand_and_paths_from_the_files_folder(tmp_path)
     assert read_scenario(file) == asked
     with pytest.raises(dataclasses.FrozenInstanceError):
         asked.map.path = "other"
+
+
+def test_a_layer_of_a_file_is_looked_for_beside_the_scenario(folder, capsys):
+    lakes = geopandas.GeoDataFrame(geometry=[shapely.box(2, 6, 4, 8)], crs="EPSG:32617")
+    for name in ("lakes", "area"):
+        lakes.to_file("../maps/data.gpkg", layer=name)
+    file = scenario(
+        '[map]\nscene = "one-peak"\n[constraints]\nobstacles = ["data.gpkg:lakes", "data.gpkg"]\n'
+        'keep_in = "data.gpkg:area"\n',
+        "../maps/a.toml",
+    )
+    limits = read_scenario(file).constraints
+    assert limits.obstacles == ("../maps/data.gpkg:lakes", "../maps/data.gpkg")
+    assert limits.keep_in == "../maps/data.gpkg:area"
+    counts = [len(list(read_layers(Path(name)))) for name in limits.obstacles]
+    assert counts == [1, 2]
+
+
+# Named as GDAL does, or nowhere to be found: another program's word for it stays.
+OTHER_NAMES = [
+    "/vsizip/maps.zip/dem.tif",
+    "/vsizip//abs/maps.zip/dem.tif",
+    "/vsicurl/https://example.org/dem.tif",
+    "https://example.org/dem.tif",
+    'NETCDF:"dem.nc":height',
+    "GPKG:data.gpkg:heights",
+    "missing.gpkg:lakes",
+    ":lakes",
+    "folder:",
+]
+
+
+@pytest.mark.parametrize("name", OTHER_NAMES)
+def test_names_that_gdal_alone_understands_stay_as_they_are(name, tmp_path):
+    for folder in ("https", "folder"):
+        (tmp_path / folder).mkdir()
+    for file in ("dem.nc", "data.gpkg"):
+        (tmp_path / file).touch()
+    file = tmp_path / "a.toml"
+    file.write_text(
+        f"[map]\npath = '{name}'\n[map.layers.rocks]\nfile = '{name}'\n"
+        f"[constraints]\nobstacles = ['{name}']\n"
+    )
+    asked = read_scenario(file)
+    assert (
+        asked.map.path == asked.map.layers["rocks"].file == asked.constraints.obstacles[0] == name
+    )
+
+
+def test_outputs_with_a_colon_go_beside_the_scenario(tmp_path):
+    file = tmp_path / "a.toml"
+    file.write_text(
+        '[map]\nscene = "one-peak"\n[output]\nfiles = ["route-12:30.geojson", "/abs/a:b.csv"]\n'
+        'plot = "route-12:30.png"\n'
+    )
+    output = read_scenario(file).output
+    assert output.files == (str(tmp_path / "route-12:30.geojson"), "/abs/a:b.csv")
+    assert output.plot == str(tmp_path / "route-12:30.png")
 
 
 def test_one_goal_and_a_list_of_goals_are_told_apart(tmp_path):

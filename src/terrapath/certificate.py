@@ -88,7 +88,7 @@ class Certificate(Claim):
 
     @classmethod
     def load(cls, path: str | FilePath) -> Certificate:
-        """Read what ``save`` wrote. Raises MapError where it is something else."""
+        """Read what ``save`` wrote. Raises MapError where there is nothing, or something else."""
         try:
             # Opened here, for NumPy leaves open what it cannot read.
             with FilePath(path).open("rb") as source, np.load(source, allow_pickle=False) as file:
@@ -103,6 +103,8 @@ class Certificate(Claim):
                     fingerprint=str(file["fingerprint"]),
                     seal=str(file["seal"]),
                 )
+        except FileNotFoundError:
+            raise MapError(f"{path} does not exist; check the path") from None
         except Exception as error:  # of a foreign file, zip, zlib and NumPy raise whatever they do
             reason = " ".join(str(error).split()) or type(error).__name__
             raise MapError(f"{path} is not a certificate: {reason:.200}") from None

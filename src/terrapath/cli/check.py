@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import time
-import zipfile
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import InputError, MapError
+from ..errors import InputError
 from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .question import Question, scenario_of
 
 if TYPE_CHECKING:
-    from ..certificate import Certificate
     from ..problem import Problem
     from .question import Itinerary
-
-
-def _load(path: Path) -> Certificate:
-    from ..certificate import Certificate
-
-    try:
-        return Certificate.load(path)
-    except (zipfile.BadZipFile, zlib.error) as error:
-        raise MapError(f"{path} is not a certificate, or damaged: {error}") from None
 
 
 def _leg(asked: Itinerary, number: int | None) -> Problem:
@@ -62,10 +50,12 @@ def check_command(
     """Prove a lower bound again, from nothing but the problem and its certificate.
 
     Give the problem's options as they were given to `terrapath plan`. Exit codes: 0 it holds,
-    2 it does not, or is no certificate of this problem.
+    2 it does not, or is no certificate of this problem, 5 standard output is closed or full.
     """
+    from ..certificate import Certificate
+
     question = Question(scenario_of(where, given))
-    loaded = _load(certificate)
+    loaded = Certificate.load(certificate)
     with compiling_told():
         problem = _leg(question.itinerary(), leg)
         started = time.perf_counter()

@@ -12,4 +12,5 @@ class ExitCode(enum.IntEnum):
     BAD_INPUT = 2
     NOT_FOUND = 3
     UNREACHABLE = 4
+    NOT_SHOWN = 5  # standard output is closed or full; files are written
     INTERRUPTED = 130

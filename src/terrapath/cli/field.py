@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,8 +28,8 @@ class Outputs:
     files: list[Path]
     plot: Path | None
 
-    def check(self) -> None:
-        """Find out beforehand whether all can be written."""
+    def check(self, inputs: Iterable[str]) -> None:
+        """Find out beforehand whether all can be written, and replaces no input."""
         from ..io.fields import require_known_format
 
         if not self.files and self.plot is None:
@@ -39,7 +40,7 @@ class Outputs:
             from ..plotting.figure import require_known_picture
 
             require_known_picture(self.plot)
-        require_outputs([*self.files, *([] if self.plot is None else [self.plot])])
+        require_outputs([*self.files, *([] if self.plot is None else [self.plot])], inputs)
 
     def write(self, field: DistanceField) -> None:
         """Write every file."""
@@ -74,11 +75,12 @@ def field_command(
     """Compute the distance field: the least length from the start to every node of a lattice.
 
     Of a scenario file only the map, the start, the bounds, the constraints and the spacing
-    count. Exit codes: 0 done, 2 bad input, 130 interrupted (nothing is written).
+    count. Exit codes: 0 done, 2 bad input, 5 standard output is closed or full (all files are
+    written), 130 interrupted (nothing is written).
     """
-    outputs = Outputs(output or [], plot)
-    outputs.check()
     scenario = scenario_of(where, given)
+    outputs = Outputs(output or [], plot)
+    outputs.check([where, *scenario.inputs()])
     from ..eikonal import field_of
     from .report import print_field
 
@@ -86,6 +88,9 @@ def field_command(
         problem = Question(scenario).problem_to_itself()
         started = time.perf_counter()
         field = field_of(problem, spacing=scenario.planner.spacing)
-    print_field(problem, field, time.perf_counter() - started)
-    outputs.write(field)
+    seconds = time.perf_counter() - started
+    try:
+        print_field(problem, field, seconds)
+    finally:
+        outputs.write(field)
     return ExitCode.SOLVED

@@ -32,14 +32,14 @@ def init_command(
 
     Exit codes: 0 written, 2 bad input.
     """
-    from ..files import require_writable, written_whole
+    from ..files import written_whole
     from ..io.scenario_template import scenario_of_map, scenario_of_scene
     from ..scenes import SCENES
-    from .outputs import require_ending
+    from .outputs import require_ending, require_outputs
 
     file = output or Path(f"{where if where in SCENES else Path(where).stem}.toml")
     require_ending(file, "output", ".toml")
-    require_writable(file)
+    require_outputs([file], [where])
     if file.exists() and not force:
         raise InputError(f"{file} exists; name another by --output, or give --force to replace it")
     text = scenario_of_scene(where) if where in SCENES else scenario_of_map(where, file, crs)

@@ -20,6 +20,7 @@ from .remarks import remark, remarks
 from .reproduce import reproduce_command
 from .scenes import scenes_command
 from .schema import schema_command
+from .streams import settle
 from .warmup import warmup_command
 
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
@@ -66,6 +67,15 @@ def _fail(message: str) -> int:
     return ExitCode.BAD_INPUT
 
 
+def _not_shown(reason: object) -> int:
+    """What there is to show has nowhere to go."""
+    remark(
+        f"standard output cannot be written: {reason}; send it elsewhere, or keep the answer by "
+        "--output FILE"
+    )
+    return ExitCode.NOT_SHOWN
+
+
 def run(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; no error escapes as a traceback."""
     given = sys.argv[1:] if arguments is None else arguments
@@ -78,6 +88,13 @@ def run(arguments: list[str] | None = None) -> int:
         return _fail(str(error))
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED
+    except SystemExit:  # of Rich and Click, where whoever read standard output has gone
+        return _not_shown("nobody reads it")
+    except OSError as error:
+        # What goes wrong with a file is a MapError: what names none is the stream's.
+        if error.errno is None or error.filename is not None:
+            raise
+        return _not_shown(error.strerror)
 
 
 def main() -> None:
@@ -86,5 +103,6 @@ def main() -> None:
     # runs for days, and once more at the end, takes a seventh of the time of a plan on a scene.
     gc.set_threshold(20_000, 20, 100)
     code = run()
+    settle(sys.__stdout__, sys.__stderr__)
     gc.freeze()
     sys.exit(code)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,14 +16,35 @@ if TYPE_CHECKING:
     from ..problem import Problem, Solution
 
 
-def require_outputs(paths: Sequence[Path]) -> None:
-    """Raise MapError where a file cannot be written, or is named twice."""
+def require_outputs(paths: Sequence[Path], inputs: Iterable[str]) -> None:
+    """Raise MapError where a file cannot be written, is named twice, or holds an input."""
     from ..files import require_writable
 
     for path in paths:
         require_writable(path)
-    if len({path.absolute() for path in paths}) < len(paths):
+    places = {_place(path): path for path in paths}
+    if len(places) < len(paths):
         raise MapError("the same file is named twice among the outputs; name each once")
+    for name in inputs:
+        for read in map(_place, _files_in(name)):
+            for place in (read, *read.parents):  # an output may be a folder
+                if place in places:
+                    raise MapError(
+                        f"output={str(places[place])!r} would replace the input {name!r}; name "
+                        "another file"
+                    )
+
+
+def _place(path: Path) -> Path:
+    """Where a path leads. Path.resolve would raise where links go in circles."""
+    return Path(os.path.realpath(path))
+
+
+def _files_in(name: str) -> Iterator[Path]:
+    """What may be the file in an input's name: FILE, FILE:LAYER, DRIVER:"FILE":PART, ..."""
+    for text in (name, name.partition(":")[2]):
+        before, _, after = text.rpartition(":")
+        yield from (Path(part.strip('"')) for part in (text, before, after) if part)
 
 
 def require_ending(path: Path, option: str, ending: str) -> None:
@@ -60,8 +82,8 @@ class RouteOutputs:
         path = _path(self.asked.certificate)
         return [] if path is None else numbered(path, self.legs)
 
-    def check(self) -> None:
-        """Find out before the planning whether all can be written."""
+    def check(self, inputs: Iterable[str]) -> None:
+        """Find out before the planning whether all can be written, and replaces no input."""
         from ..io.routes import require_known_format
 
         asked = self.asked
@@ -80,7 +102,7 @@ class RouteOutputs:
             require_known_page(page)
         for certificate in self.certificates:
             require_ending(certificate, "certificate", ".npz")
-        require_outputs([*self.files, *pictures, *pages, *self.certificates])
+        require_outputs([*self.files, *pictures, *pages, *self.certificates], inputs)
 
     def require_fit(self, problem: Problem) -> None:
         """Raise MapError where a format cannot hold a route on this plane."""

@@ -134,14 +134,15 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
 
     All options may stand in a scenario file, see `terrapath init`; those given here count
     before the file's. Exit codes: 0 solved, 2 bad input, 3 no path found within the limits,
-    4 proven unreachable, 130 interrupted (the best route to the goal so far is written).
+    4 proven unreachable, 5 standard output is closed or full (all files are written), 130
+    interrupted (the best route to the goal so far is written).
     """
     scenario = scenario_of(where, given)
     _require_agreement(scenario)
     planner = _planner(scenario)
     output, route = scenario.output, scenario.route
     outputs = RouteOutputs(output, len(route.via) + 1)
-    outputs.check()
+    outputs.check([where, *scenario.inputs()])
     question, quiet = Question(scenario), output.quiet or output.json
     with compiling_told(quiet):
         if is_planned_in_corridor(scenario, cells := question.cells()):
@@ -150,10 +151,13 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
             itinerary = question.itinerary()
             outputs.require_fit(itinerary.problem)
             answer = _solve(planner, itinerary, route.all_goals, quiet)
-    # Shown before it is written, so that a full disk loses no answer.
-    _print(answer, scenario)
-    if answer.solution.path is not None:
-        outputs.write(answer.solution)
+    # Shown before it is written, so that a full disk loses no answer; and written although it
+    # cannot be shown.
+    try:
+        _print(answer, scenario)
+    finally:
+        if answer.solution.path is not None:
+            outputs.write(answer.solution)
     return exit_code(answer.solution)
 
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, cast
 
 from ..errors import TerrapathWarning
 
 
 def remark(message: object) -> None:
-    """One line on standard error."""
-    print("terrapath:", " ".join(str(message).split()), file=sys.stderr)
+    """One line on standard error, if anybody takes it."""
+    with suppress(OSError):
+        print("terrapath:", " ".join(str(message).split()), file=sys.stderr)
 
 
 @contextmanager

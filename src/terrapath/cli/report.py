@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Iterator
 
 import numpy as np
@@ -14,6 +13,7 @@ from ..planners import GoalAnswer
 from ..problem import Path, Problem, Solution, Status
 from ..surface import Layer, Surface
 from .records import goal_state
+from .remarks import remark
 
 # Of the routes that a planner found besides the best, so many are shown.
 MOST_ALTERNATIVES = 5
@@ -262,8 +262,7 @@ def print_report(
     if answers := list(goals):
         _print_goals(answers, solution.problem.surface)
     if solution.status is not Status.SOLVED:
-        reason = f"{solution.status.message} (stopped by: {solution.stopped_by})"
-        print(f"terrapath: {reason}", file=sys.stderr)
+        remark(f"{solution.status.message} (stopped by: {solution.stopped_by})")
 
 
 def print_check(problem: Problem, certificate: Certificate, seconds: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import typer
 from ..watch import Watch
 from .bars import bar_for_each
 from .exit_codes import ExitCode
+from .remarks import remark
 
 
 def run_resumable(work: Callable[[Watch], Path], output: Path, quiet: bool) -> int:
@@ -19,10 +19,9 @@ def run_resumable(work: Callable[[Watch], Path], output: Path, quiet: bool) -> i
         with bar_for_each(quiet) as watch:
             report = work(watch)
     except KeyboardInterrupt:
-        print(
-            f"terrapath: interrupted; the finished trials are kept in {output / 'trials'}, and "
-            "the same command goes on from there",
-            file=sys.stderr,
+        remark(
+            f"interrupted; the finished trials are kept in {output / 'trials'}, and the same "
+            "command goes on from there"
         )
         return ExitCode.INTERRUPTED
     typer.echo(report)

@@ -53,9 +53,10 @@ def is_xarray(source: Any) -> bool:
     return type(source).__module__.split(".")[0] == "xarray"
 
 
-def band_of_numpy(source: tuple[Any, Any, Any], crs: CRS | None) -> ArrayBand:
-    """(values, x, y): values (ny, nx) at the coordinates of the cell centres."""
+def band_of_numpy(source: tuple[Any, Any, Any], which: int | str, crs: CRS | None) -> ArrayBand:
+    """(values, x, y): values (ny, nx) at the coordinates of the cell centres; which : 1."""
     values, x, y = source
+    _require_band(which, 1, "the array")
     x, y = as_array(x, "x", shape=(None,)), as_array(y, "y", shape=(None,))
     array = np.ma.asarray(values)
     if array.shape != (len(y), len(x)):
@@ -92,6 +93,11 @@ def band_of_xarray(source: Any, which: int | str, crs: CRS | None, *, label: str
         as_array(array[axis].values, f"{axis} of {label}", shape=(None,)) for axis in (x, y)
     )
     return _on_axes(array, x_axis, y_axis, found, **described)
+
+
+def _require_band(which: int | str, count: int, label: str) -> None:
+    if not (isinstance(which, int) and 1 <= which <= count):
+        raise MapError(f"band={which!r} is not in {label}; it has {count}, counted from 1")
 
 
 def _require_numbers(kind: np.dtype[Any], label: str) -> None:
@@ -187,10 +193,8 @@ def _plane(array: Any, x: Hashable, y: Hashable, which: int | str, label: str) -
             f"{label} has the further dimensions {', '.join(map(str, rest))}; pick one map of it "
             "first, as with .isel"
         )
-    count = array.sizes[rest[0]] if rest else 1
-    if not (isinstance(which, int) and 1 <= which <= count):
-        raise MapError(f"band={which!r} is not in {label}; it has {count}, counted from 1")
-    return array.isel({rest[0]: which - 1}) if rest else array
+    _require_band(which, array.sizes[rest[0]] if rest else 1, label)
+    return array.isel({rest[0]: int(which) - 1}) if rest else array
 
 
 def _mapping(source: Any, array: Any) -> dict[str, Any]:

@@ -103,7 +103,7 @@ def _open(source: LayerSource, files: ExitStack, crs: CRS | None, *, heights: bo
     if is_xarray(place):
         return band_of_xarray(place, band, crs)
     if isinstance(place, tuple) and len(place) == 3:
-        return band_of_numpy(place, crs)
+        return band_of_numpy(place, band, crs)
     if not isinstance(place, (str, Path)):
         shown = " ".join(repr(place).split())
         raise InputError(

@@ -128,14 +128,18 @@ def _require_one_map(scenario: Scenario, text: str, file: Path) -> None:
 
 def _resolved(scenario: Scenario, folder: Path) -> Scenario:
     """The scenario with its files seen from where the command runs."""
+    seen: Any
     changed: dict[str, dict[str, Any]] = {}
     for entry in options():
         value = getattr(getattr(scenario, entry.section), entry.key)
-        if entry.option.is_file and value:
-            seen = _seen_from(folder, value)
+        see = functools.partial(_joined if entry.section == "output" else _seen_from, folder)
+        if entry.option.is_file and isinstance(value, tuple):
+            seen = tuple(map(see, value))
+        elif entry.option.is_file and value:
+            seen = see(value)
         elif isinstance(value, dict) and entry.key in {"layers", "costs"}:
             seen = {
-                name: dataclasses.replace(table, file=_seen_from(folder, table.file))
+                name: dataclasses.replace(table, file=see(table.file))
                 for name, table in value.items()
             }
         else:
@@ -144,13 +148,18 @@ def _resolved(scenario: Scenario, folder: Path) -> Scenario:
     return scenario.overridden(changed)
 
 
-def _seen_from(folder: Path, value: Any) -> Any:
-    """A path, or each of several. What GDAL opens by another name (NETCDF:...) stays."""
-    if isinstance(value, tuple):
-        return tuple(_seen_from(folder, part) for part in value)
-    joined = folder / value
-    is_name = ":" in value and not _exists(joined)
-    return value if is_name else str(joined)
+def _joined(folder: Path, name: str) -> str:
+    return str(folder / name)
+
+
+def _seen_from(folder: Path, name: str) -> str:
+    """FILE or FILE:LAYER. What GDAL opens by another name (NETCDF:..., /vsizip/...) stays."""
+    if "://" in name or name.startswith("/vsi"):
+        return name
+    file, _, layer = name.rpartition(":")
+    is_layer = bool(file and layer) and _exists(folder / file)
+    is_other = ":" in name and not is_layer and not _exists(folder / name)
+    return name if is_other else _joined(folder, name)
 
 
 def _exists(path: Path) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from .listing import options
+from .listing import SECTIONS, options
 from .option import STRICT
 from .problem import ConstraintsSection, MapSection, RouteSection
 from .solution import OutputSection, PlannerSection
@@ -27,12 +27,20 @@ class Scenario:
 
     def files(self) -> Iterator[str]:
         """All files that are named, to be read or written."""
-        for entry in options():
+        yield from self.inputs()
+        yield from self._named("output")
+
+    def inputs(self) -> Iterator[str]:
+        """The files that are named to be read."""
+        yield from self._named(*(name for name in SECTIONS if name != "output"))
+        for table in (*self.map.layers.values(), *self.map.costs.values()):
+            yield table.file
+
+    def _named(self, *sections: str) -> Iterator[str]:
+        for entry in options(*sections):
             value = getattr(getattr(self, entry.section), entry.key)
             if entry.option.is_file and value:
                 yield from [value] if isinstance(value, str) else value
-        for table in (*self.map.layers.values(), *self.map.costs.values()):
-            yield table.file
 
     def overridden(self, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
         """With the values given, by section and key; tables are merged name by name."""
