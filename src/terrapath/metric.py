@@ -20,7 +20,7 @@ FEATURES_PER_PIECE = 4.0
 
 
 def metric_tensor(surface: Surface, points: Any) -> Array:
-    """H = I + sum_k w_k^2 grad x_k grad x_k^T.
+    """The metric h = c^2 (I + sum_k w_k^2 grad x_k grad x_k^T); c is the cost, 1 without costs.
 
     points : (..., 2), map units. Returns (..., 2, 2), without unit.
     Raises OutsideSurfaceError where a point is off the surface. Source: paper, section 3.2.
@@ -32,18 +32,19 @@ def metric_tensor(surface: Surface, points: Any) -> Array:
 
 
 def determinant(surface: Surface, points: Any) -> Array:
-    """D = det h, the squared ratio of area on the surface to area on the plane.
+    """The determinant d = det h, the squared ratio of area on the surface to area on the plane.
 
-    points : (..., 2), map units. Returns (...). Source: paper, section 3.2.
+    With costs it is times c^4. points : (..., 2), map units. Returns (...), without unit.
+    Source: paper, section 3.2.
     """
     h = metric_tensor(surface, points)
     return np.asarray(h[..., 0, 0] * h[..., 1, 1] - h[..., 0, 1] ** 2)
 
 
 def inverse_metric_tensor(surface: Surface, points: Any) -> Array:
-    """h^-1, from the adjugate of h over d. points (..., 2) -> (..., 2, 2).
+    """The inverse h^-1, from the adjugate of h over d. With costs it is times c^-2.
 
-    Source: paper, section 3.2.
+    points : (..., 2), map units. Returns (..., 2, 2), without unit. Source: paper, section 3.2.
     """
     h = metric_tensor(surface, points)
     d = h[..., 0, 0] * h[..., 1, 1] - h[..., 0, 1] ** 2

@@ -25,7 +25,7 @@ class RRTStar:
     samples : samples drawn.
     step : longest edge, map units; by default a twelfth of the region's side.
     metric : "riemannian" measures edges by Line-R; "chord" by the Euclidean distance in
-        R^n, which makes the original RRT*, the paper's baseline.
+        R^n; with ``informed=False`` that is the original RRT*, the paper's baseline.
     seed : of the one random generator; the same seed gives the same tree, to the last bit.
     radius_factor : how many times the radius that optimality needs in theory.
     goal_bias : share of samples that are the goal, until it is reached.
