@@ -4,27 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ..bounding import lower_bound
 from ..certificate import Certificate
-from ..errors import TerrapathWarning
+from ..errors import warn_unfinished
 from ..problem import Problem, Solution, Status
 from ..refinement import refine
 from ..validation import require_bool, require_positive
 from .base import INTERRUPT, PROVING, REFINING, Callback, Planner, Progress
-
-
-class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
-    """A path could not be refined or bounded, and is given as it was before."""
-
-
-def warn_unfinished(what: str, error: Exception) -> None:
-    """Tell what could not be done, and why."""
-    reason = " ".join(f"{type(error).__name__}: {error}".split())
-    warnings.warn(f"{what}: {reason}", UnfinishedWarning, stacklevel=3)
 
 
 @dataclass(frozen=True, kw_only=True)
