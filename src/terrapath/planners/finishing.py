@@ -45,11 +45,15 @@ class Finished:
         return self.planner.name
 
     def _options(self) -> dict[str, Any]:
-        """What was asked for, as far as it says anything."""
-        own = vars(self.planner).items()
-        options = {name: value for name, value in own if not name.startswith("_")}
-        options |= {"refine": self.refine, "bound": self.bound, "target_gap": self.target_gap}
-        return {name: value for name, value in options.items() if value is not None}
+        """What was asked for, as far as it says anything; the planner's own word is the last."""
+        own = {name: value for name, value in vars(self.planner).items() if name[0] != "_"}
+        asked = {"refine": self.refine, "bound": self.bound, "target_gap": self.target_gap}
+        return {
+            name: value
+            for options in (asked, own)
+            for name, value in options.items()
+            if value is not None
+        }
 
     def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
         """Plan and finish. ``callback`` sees the progress and may stop the planner or the bound.
