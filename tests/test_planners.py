@@ -185,6 +185,14 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(name, problem):
     np.testing.assert_array_equal(solution.path.points[[0, -1]], [problem.start, problem.goal])
 
 
+def test_rrt_ends_as_soon_after_the_first_path_as_it_says(problem):
+    solution = tp.plan(problem, "rrt", samples=MANY)
+    assert solution.stopped_by == "first path"
+    assert np.isinf(solution.history.best_cost[:-1]).all()
+    assert (np.diff(solution.history.samples) <= tree_search.CHUNK).all()
+    assert f"within {tree_search.CHUNK} samples of the first path" in tp.RRT.__doc__
+
+
 def test_a_time_limit_without_a_path_is_not_found(enclosed):
     for name in TREE_PLANNERS:
         solution = tp.plan(enclosed, name, samples=MANY, time_limit=1e-9)
