@@ -8,14 +8,10 @@ from dataclasses import dataclass, replace
 from ..distinct_routes import routes_of_fields, shortest
 from ..eikonal import DistanceField, Medium, march_from
 from ..errors import warn_unfinished
-from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search
+from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
 from .finishing import bounded
-
-# Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
-HALVINGS = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,9 +87,7 @@ class _Run:
     def find_routes(self) -> None:
         """The locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
-        spacing = self.planner.spacing or problem.default_spacing
-        for _ in range(HALVINGS + 1):
-            lattice = Lattice.spanning(problem.bounds, spacing)
+        for lattice in lattices(problem, self.planner.spacing):
             self.total = self.samples + 2 * lattice.nx * lattice.ny
             medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
             from_start = self.march(problem.start, medium)
@@ -106,7 +100,6 @@ class _Run:
                 if not self.must_stop():
                     self.refine_routes(from_start, from_goal)
                 return
-            spacing *= 0.5
 
     def march(self, end: tuple[float, float], medium: Medium) -> DistanceField:
         problem = self.problem
