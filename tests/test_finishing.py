@@ -187,6 +187,19 @@ def test_a_planner_with_a_target_gap_of_its_own_is_given_it():
     assert made.name == "rrt"
 
 
+@pytest.mark.parametrize(("asked", "gap"), [({"target_gap": 0.05}, 0.05), ({}, 0.001)])
+def test_the_options_tell_the_target_gap_that_optimal_worked_on(asked, gap, problem):
+    stay = tp.Problem(problem.surface, (2, 5), (2, 5), problem.bounds)
+    options = tp.plan(stay, "optimal", **asked).options
+    assert options == {"routes": 3, "target_gap": gap, "refine": False, "bound": False}
+
+
+def test_the_options_tell_the_target_gap_of_the_finishing(problem):
+    stay = tp.Problem(problem.surface, (2, 5), (2, 5), problem.bounds)
+    assert tp.plan(stay, "rrt", target_gap=0.05).options["target_gap"] == 0.05
+    assert "target_gap" not in tp.plan(stay, "rrt").options
+
+
 # Optimal: as the tree planners, it keeps the best so far and says what ended it
 
 

@@ -15,6 +15,7 @@ from oracles import (
     mask_is_free_by_shapely,
     segment_is_free_by_shapely,
 )
+from terrapath.free_space import index_grid
 from terrapath.validation import Bounds
 
 BOUNDS = Bounds(-1.0, -1.0, 11.0, 11.0)
@@ -121,6 +122,14 @@ def test_large_map_coordinates_change_nothing(seed, x, y):
     bounds = Bounds(x - 1, y - 1, x + 11, y + 11)
     a, b = (np.clip(p + np.array([x, y]), bounds[:2], bounds[2:]) for p in (a, b))
     check(geometries, circles, a, b, bounds)
+
+
+@pytest.mark.parametrize(("items", "side"), [(0, 1), (7, 1), (8, 2), (200, 10), (10**9, 1024)])
+def test_the_index_has_a_cell_for_every_two_items_up_to_its_most(items, side):
+    grid = index_grid(Bounds(-1.0, -2.0, 11.0, 2.0), items)
+    assert (grid.nx, grid.ny) == (side, side)
+    corner = (grid.x0 + grid.nx * grid.dx, grid.y0 + grid.ny * grid.dy)
+    assert corner == pytest.approx((11.0, 2.0), rel=1e-12)
 
 
 @given(seed=seeds)

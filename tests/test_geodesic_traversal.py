@@ -15,6 +15,7 @@ from oracles import geodesic_by_collocation, geodesic_by_hamilton, peaks_jets
 from terrapath import scenes
 from terrapath.cli.main import run
 from terrapath.geodesics import trace_ray
+from terrapath.planners import geodesic_traversal
 
 SCENES = {
     "one-peak": [scenes.ONE_PEAK],
@@ -268,6 +269,53 @@ def test_the_units_and_the_origin_of_the_map_do_not_matter(scale, shift):
     solution = tp.GeodesicTraversal(directions=100).solve(problem)
     assert solution.cost == pytest.approx(scale * 16.142532164, rel=1e-9)
     assert len(solution.alternatives) == 2
+
+
+# What ends it early
+
+
+def interrupt(*_, **__):
+    raise KeyboardInterrupt
+
+
+def test_ctrl_c_while_the_first_geodesic_is_solved_for_leaves_the_rays(monkeypatch):
+    monkeypatch.setattr(geodesic_traversal, "hit", interrupt)
+    solution = tp.GeodesicTraversal(directions=40).solve(scenes.load("one-peak"))
+    assert solution.status is tp.Status.INTERRUPTED
+    assert solution.path is None
+    assert 2 <= solution.samples <= 40
+
+
+def test_ctrl_c_while_a_later_geodesic_is_solved_for_keeps_those_before(monkeypatch):
+    whole = fan_of("one-peak", 40).geodesics
+    hit, calls = geodesic_traversal.hit, []
+
+    def hit_once(*arguments, **options):
+        calls.append(arguments)
+        return hit(*arguments, **options) if len(calls) == 1 else interrupt()
+
+    monkeypatch.setattr(geodesic_traversal, "hit", hit_once)
+    fan = tp.GeodesicTraversal(directions=40).fan(scenes.load("one-peak"))
+    assert fan.interrupted
+    assert len(whole) > len(fan.geodesics) == 1
+    assert fan.geodesics[0].length in [geodesic.length for geodesic in whole]
+    assert len(fan.rays) == len(fan.misses) < 40
+
+
+def test_the_callback_sees_each_geodesic_and_ends_the_fan_there():
+    problem, seen = scenes.load("one-peak"), []
+
+    def stop_once_there_is_a_path(progress):
+        seen.append(progress.best_cost)
+        return progress.best_cost < math.inf
+
+    solution = tp.GeodesicTraversal(directions=40).solve(
+        problem, callback=stop_once_there_is_a_path
+    )
+    assert seen[:-1] == [math.inf] * (len(seen) - 1)
+    assert solution.status is tp.Status.SOLVED
+    assert solution.cost == seen[-1]
+    assert solution.samples == len(seen) < 40
 
 
 # Options

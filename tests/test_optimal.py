@@ -7,7 +7,8 @@ import pytest
 import shapely
 
 import terrapath as tp
-from terrapath import scenes
+from terrapath import distinct_routes, scenes
+from terrapath.planners import UnfinishedWarning
 
 START, GOAL, REGION = (0.0, 0.0), (10.0, 10.0), (-1.0, -1.0, 11.0, 11.0)
 PAPER = [name for name in scenes.names() if name != "jacksboro"]
@@ -96,6 +97,88 @@ def test_both_sides_of_an_obstacle():
     assert [path.length for path in below_or_above] == pytest.approx([above, below], rel=1e-6)
     for path in below_or_above:
         assert path.line.disjoint(block)
+
+
+# What ends the refinement of one route, and what is left of the others
+
+
+BESIDE_A_DISC = tp.Problem(
+    FLAT, (1.0, 5.0), (9.0, 5.0), (0.0, 0.0, 10.0, 10.0), [shapely.Point(5.0, 5.3).buffer(2.0)]
+)
+
+
+@pytest.fixture
+def raising(monkeypatch):
+    """Makes the refinement of these candidates, counted from 1, raise an error."""
+
+    def patch(error, *candidates):
+        refine, calls = distinct_routes.refine, []
+
+        def refine_or_raise(problem, path):
+            calls.append(path)
+            if len(calls) in candidates:
+                raise error
+            return refine(problem, path)
+
+        monkeypatch.setattr(distinct_routes, "refine", refine_or_raise)
+
+    return patch
+
+
+def lengths_beside_a_disc():
+    return [path.length for path in tp.alternatives(BESIDE_A_DISC, 3, spacing=0.2)]
+
+
+def test_ctrl_c_keeps_the_routes_that_are_refined(raising):
+    below, _ = lengths_beside_a_disc()
+    raising(KeyboardInterrupt, 2)
+    solution = tp.Optimal(spacing=0.2).solve(BESIDE_A_DISC)
+    assert solution.status is tp.Status.INTERRUPTED
+    assert solution.length == below
+    assert solution.unrefined.length > below
+
+
+def test_a_route_that_cannot_be_refined_does_not_lose_those_before(raising):
+    below, _ = lengths_beside_a_disc()
+    raising(ArithmeticError("by zero"), 2)
+    with pytest.warns(UnfinishedWarning, match="not every route could be refined.*by zero") as told:
+        solution = tp.Optimal(target_gap=1.0, spacing=0.2).solve(BESIDE_A_DISC)
+    assert len(told) == 1
+    assert solution.status is tp.Status.SOLVED
+    assert solution.length == below
+    assert solution.unrefined is not None
+
+
+def test_a_route_that_cannot_be_refined_does_not_lose_those_after(raising):
+    below, above = lengths_beside_a_disc()
+    raising(ArithmeticError("by zero"), 1)
+    with pytest.warns(UnfinishedWarning, match="not every route could be refined"):
+        solution = tp.Optimal(target_gap=1.0, spacing=0.2).solve(BESIDE_A_DISC)
+    assert below < solution.length < above  # fast marching's path is shorter than the other way
+    assert solution.unrefined is None
+    assert [path.length for path in solution.alternatives] == [above]
+
+
+def test_where_no_route_can_be_refined_the_path_is_fast_marchings(raising):
+    raising(ArithmeticError("by zero"), *range(1, 100))
+    with pytest.warns(UnfinishedWarning, match="no route could be refined; the path is") as told:
+        solution = tp.Optimal(target_gap=1.0, spacing=0.2).solve(BESIDE_A_DISC)
+    assert len(told) == 1
+    assert solution.status is tp.Status.SOLVED
+    assert solution.alternatives == ()
+
+
+def test_alternatives_leave_out_what_cannot_be_refined(raising):
+    _, above = lengths_beside_a_disc()
+    raising(ArithmeticError("by zero"), 1)
+    with pytest.warns(UnfinishedWarning, match="the others are given: ArithmeticError: by zero"):
+        assert lengths_beside_a_disc() == [above]
+
+
+def test_alternatives_raise_where_nothing_can_be_refined(raising):
+    raising(ArithmeticError("by zero"), *range(1, 100))
+    with pytest.raises(ArithmeticError, match="by zero"):
+        tp.alternatives(BESIDE_A_DISC, spacing=0.2)
 
 
 def test_flat_ground_has_one_route_and_no_gap():

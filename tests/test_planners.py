@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import math
 import os
 import signal
@@ -183,6 +184,31 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(name, problem):
     same = tp.plan(problem, name, samples=tree_search.CHUNK, step=3.0)
     assert solution.samples == same.samples
     np.testing.assert_array_equal(solution.path.points[[0, -1]], [problem.start, problem.goal])
+
+
+def test_rrt_ends_as_soon_after_the_first_path_as_it_says(problem):
+    solution = tp.plan(problem, "rrt", samples=MANY)
+    assert solution.stopped_by == "first path"
+    assert np.isinf(solution.history.best_cost[:-1]).all()
+    assert (np.diff(solution.history.samples) <= tree_search.CHUNK).all()
+    assert f"within {tree_search.CHUNK} samples of the first path" in tp.RRT.__doc__
+
+
+@pytest.mark.parametrize("name", ["fast-marching", "optimal"])
+def test_where_the_nodes_show_no_way_finer_ones_are_tried(name, enclosed, monkeypatch):
+    module = importlib.import_module(f"terrapath.planners.{name.replace('-', '_')}")
+    march, nodes = module.march_from, []
+
+    def march_and_note(surface, space, end, medium, **options):
+        field = march(surface, space, end, medium, **options)
+        nodes.append(field.lattice.nx)
+        return field
+
+    monkeypatch.setattr(module, "march_from", march_and_note)
+    solution = tp.plan(enclosed, name, spacing=0.4)
+    assert solution.status is tp.Status.NOT_FOUND
+    assert solution.stopped_by == "no way between the nodes"
+    assert nodes == [31, 61, 121]
 
 
 def test_a_time_limit_without_a_path_is_not_found(enclosed):

@@ -1,7 +1,7 @@
 """Tours and nearest goals: legs add up, bounds hold, nothing that is not whole is a route."""
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -11,8 +11,10 @@ import terrapath as tp
 from terrapath.io import route_record
 from terrapath.metric import curve_length
 from terrapath.planners import (
+    Finished,
     Planner,
     Progress,
+    finishing,
     make_finished,
     nearest,
     plan_goals,
@@ -168,20 +170,49 @@ def test_the_callback_is_told_which_leg_it_sees(problem):
     assert {p.leg for p in seen} == {""}
 
 
+@dataclass(frozen=True)
+class Timed:
+    """Notes the time limit that it has for each leg."""
+
+    time_limit: float | None
+    limits: list = field(default_factory=list)
+    name: str = "timed"
+
+    def solve(self, leg, *, callback=None):
+        self.limits.append(self.time_limit)
+        return stay_put(leg, self.name)
+
+
 def test_legs_share_the_time_limit(problem):
+    planner = Timed(30.0)
+    plan_tour(problem, planner, VIA)
+    assert planner.limits == pytest.approx([10.0, 15.0, 30.0], abs=1.0)  # of what is left
+
+
+def test_legs_share_the_time_limit_of_the_planner_within(problem):
+    planner, alone = Timed(30.0), Timed(30.0)
+    plan_tour(problem, Finished(planner=planner), VIA)
+    assert planner.limits == [10.0, 10.0, 10.0]
+    plan_tour(problem, Finished(planner=alone))
+    assert alone.limits == [30.0]
+
+
+def test_no_time_limit_is_made_up(problem):
+    planner = Timed(None)
+    plan_tour(problem, Finished(planner=planner), VIA)
+    assert planner.limits == [None, None, None]
+
+
+def test_a_limit_of_the_planner_within_does_not_limit_finishing(problem, monkeypatch):
     limits = []
 
-    @dataclass(frozen=True)
-    class Timed:
-        time_limit: float
-        name: str = "timed"
+    def finish(solution, *, time_limit, **_):
+        limits.append(time_limit)
+        return solution
 
-        def solve(self, leg, *, callback=None):
-            limits.append(self.time_limit)
-            return stay_put(leg, self.name)
-
-    plan_tour(problem, Timed(30.0), VIA)
-    assert limits == pytest.approx([10.0, 15.0, 30.0], abs=1.0)  # of what is left
+    monkeypatch.setattr(finishing, "finish", finish)
+    plan_tour(problem, Finished(planner=Timed(30.0)), VIA)
+    assert limits == [None, None, None]
 
 
 def test_bad_waypoints_are_named():

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 import shapely
 
 from .eikonal import DistanceField, Medium, march_from
+from .errors import warn_unfinished
 from .lattice import Lattice
 from .problem import Path, Problem
 from .refinement import refine
@@ -41,7 +42,8 @@ def alternatives(
     count : at most so many. spacing : of the nodes that routes are searched on, map units; by
     default a 250th of the region's longer side, or a cell of a finer map.
     A route is led through a node off the routes found before, where the sum of the distances
-    from start and goal is least. Empty where no route was found on the nodes.
+    from start and goal is least. Empty where no route was found on the nodes. One that cannot be
+    refined is left out, with a warning; the error is raised only where none can be.
     """
     require_count(count=count)
     if spacing is not None:
@@ -54,7 +56,18 @@ def alternatives(
         march_from(problem.surface, problem.free_space, end, medium)
         for end in (problem.start, problem.goal)
     ]
-    return routes_of_fields(problem, fields[0], fields[1], count)
+    failures: list[Exception] = []
+    found = list(routes_of_fields(problem, fields[0], fields[1], count, failed=failures.append))
+    if failures and not found:
+        raise failures[0]
+    if failures:
+        warn_unfinished("not every route could be refined; the others are given", failures[0])
+    return shortest(found, count)
+
+
+def shortest(routes: Iterable[Path], count: int) -> tuple[Path, ...]:
+    """So many of the routes at most, shortest first."""
+    return tuple(sorted(routes, key=lambda route: route.length)[:count])
 
 
 def routes_of_fields(
@@ -63,20 +76,27 @@ def routes_of_fields(
     from_goal: DistanceField,
     count: int,
     *,
+    failed: Callable[[Exception], object],
     must_stop: Callable[[], bool] | None = None,
-) -> tuple[Path, ...]:
-    """As ``alternatives``, with both distance fields given, on one lattice.
+) -> Iterator[Path]:
+    """Distinct routes as they are refined, the way down the fields first, the others in no order.
 
-    must_stop : looked at after each route that was refined; it may end the search.
+    from_start, from_goal : distance fields on one lattice. count : routes that are asked for;
+    more are looked for, since a later one may be shorter. failed : told why a route could not
+    be refined. must_stop : looked at after each candidate; it may end the search.
     """
     found: list[Path] = []
     for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
-        route = refine(problem, candidate)
-        if not any(_is_same(problem, route, other) for other in found):
-            found.append(route)
+        try:
+            route = refine(problem, candidate)
+        except Exception as error:
+            failed(error)
+        else:
+            if not any(_is_same(problem, route, other) for other in found):
+                found.append(route)
+                yield route
         if tries >= TRIES * count or (must_stop is not None and must_stop()):
             break
-    return tuple(sorted(found, key=lambda path: path.length)[:count])
 
 
 def _candidates(

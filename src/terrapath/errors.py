@@ -1,5 +1,7 @@
 """What goes wrong with an input. Every message names the value, the limit and the remedy."""
 
+import warnings
+
 
 class TerrapathError(Exception):
     """Base of every error that Terrapath raises on purpose. The command exits with 2."""
@@ -31,3 +33,13 @@ class CertificateError(TerrapathError):
 
 class TerrapathWarning(UserWarning):
     """Base of every warning that Terrapath gives on purpose. The command shows it as one line."""
+
+
+class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
+    """A path could not be refined or bounded, and is left out or given as it was before."""
+
+
+def warn_unfinished(what: str, error: Exception) -> None:
+    """Tell what could not be done, and why."""
+    reason = " ".join(f"{type(error).__name__}: {error}".split())
+    warnings.warn(f"{what}: {reason}", UnfinishedWarning, stacklevel=3)

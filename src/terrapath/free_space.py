@@ -19,8 +19,8 @@ from .separation import separated
 from .surface import Mask
 from .validation import Array, Bounds, as_array, as_point, require_positive
 
-# Around two edges a cell keeps the lists short and the index small.
-EDGES_PER_CELL = 2.0
+# Around two edges or circles a cell keeps the lists short and the index small.
+ITEMS_PER_CELL = 2.0
 MOST_CELLS_A_SIDE = 1024
 
 # Corners of the polygon inside a disc that stands for it where separation is to be proven.
@@ -129,7 +129,14 @@ def _edges(geometries: Geometries) -> Array:
     return np.asarray(edges[line[1:] == line[:-1]].reshape(-1, 4))
 
 
-def _lists(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
+def index_grid(bounds: Bounds, items: int) -> kernels.Grid:
+    """Cells over the bounds, for so many items to be listed in."""
+    side = max(1, min(int(math.sqrt(items / ITEMS_PER_CELL)), MOST_CELLS_A_SIDE))
+    step = (bounds.width / side, bounds.height / side)
+    return kernels.Grid(bounds.x1_min, bounds.x2_min, *step, side, side)
+
+
+def listed(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
     """Which items each cell of the grid holds: (first, ids) as in ``Space``."""
     counts = np.zeros(grid.nx * grid.ny + 1, np.int64)
     if len(items) == 0:  # the kernel need not even be compiled
@@ -162,9 +169,9 @@ class FreeSpace:
     def _index(self) -> kernels.Space:
         edges = _edges(self._geometries)
         circles = np.array([[c.x1, c.x2, c.radius] for c in self.circles]).reshape(-1, 3)
-        grid = self._grid(len(edges) + len(circles))
-        edge_first, edge_ids = _lists(kernels.list_edges, grid, edges)
-        circle_first, circle_ids = _lists(kernels.list_circles, grid, circles)
+        grid = index_grid(self.bounds, len(edges) + len(circles))
+        edge_first, edge_ids = listed(kernels.list_edges, grid, edges)
+        circle_first, circle_ids = listed(kernels.list_circles, grid, circles)
         frames, shapes, blocked = _stack_masks(self.masks)
         return kernels.Space(
             grid,
@@ -178,11 +185,6 @@ class FreeSpace:
             shapes,
             blocked,
         )
-
-    def _grid(self, items: int) -> kernels.Grid:
-        side = max(1, min(int(math.sqrt(items / EDGES_PER_CELL)), MOST_CELLS_A_SIDE))
-        x0, y0 = self.bounds.x1_min, self.bounds.x2_min
-        return kernels.Grid(x0, y0, self.bounds.width / side, self.bounds.height / side, side, side)
 
     @property
     def has_obstacles(self) -> bool:

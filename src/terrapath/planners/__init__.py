@@ -1,8 +1,9 @@
 """Floor 5: planners. One planner, one file; ``PLANNERS`` is the registry."""
 
+from ..errors import UnfinishedWarning
 from .base import Planner, Progress
 from .fast_marching import FastMarching
-from .finishing import Finished, UnfinishedWarning, finish
+from .finishing import Finished, finish
 from .geodesic_traversal import Fan, GeodesicTraversal
 from .grid_search import AStar, Dijkstra
 from .itinerary import GoalAnswer, nearest, plan_goals, plan_tour

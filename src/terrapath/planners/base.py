@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple, Protocol
 
+from ..lattice import Lattice
 from ..problem import Problem, Solution, Status
 
 # What a planner says that did not have to search.
@@ -15,6 +16,9 @@ SEPARATED = "start and goal lie in different parts of the free space"
 
 # What a solution says that Ctrl-C ended.
 INTERRUPT = "interrupt"
+
+# Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
+HALVINGS = 2
 
 # What a planner is at.
 SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bound"
@@ -127,3 +131,13 @@ def answer_without_search(
         return None
     seconds = time.perf_counter() - started
     return without_path(problem, planner, Status.UNREACHABLE, SEPARATED, seconds=seconds, seed=seed)
+
+
+def lattices(problem: Problem, spacing: float | None) -> Iterator[Lattice]:
+    """The lattice to look for a path on, and finer ones for where it shows none.
+
+    spacing : of the first one's nodes, map units; by default the problem's own.
+    """
+    first = spacing or problem.default_spacing
+    for halvings in range(HALVINGS + 1):
+        yield Lattice.spanning(problem.bounds, first * 0.5**halvings)

@@ -9,10 +9,7 @@ from ..eikonal import DistanceField, Medium, march_from
 from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_positive
-from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search
-
-# Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
-HALVINGS = 2
+from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,10 +53,8 @@ class _Run:
 
     def solve(self) -> Solution:
         problem = self.problem
-        spacing = self.planner.spacing or problem.default_spacing
         try:
-            for _ in range(HALVINGS + 1):
-                lattice = Lattice.spanning(problem.bounds, spacing)
+            for lattice in lattices(problem, self.planner.spacing):
                 field = self.march(lattice)
                 path = field.path_to(problem.goal)
                 if path is not None:
@@ -67,7 +62,6 @@ class _Run:
                     return self.answer(path, float(field.at(problem.goal)), shape)
                 if self.stopper.stopped_by:
                     break
-                spacing *= 0.5
         except KeyboardInterrupt:
             self.stopper.stopped_by = INTERRUPT
         return self.answer(None, None, self.stopper.stopped_by or "no way between the nodes")

@@ -4,27 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ..bounding import lower_bound
 from ..certificate import Certificate
-from ..errors import TerrapathWarning
+from ..errors import warn_unfinished
 from ..problem import Problem, Solution, Status
 from ..refinement import refine
 from ..validation import require_bool, require_positive
 from .base import INTERRUPT, PROVING, REFINING, Callback, Planner, Progress
-
-
-class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
-    """A path could not be refined or bounded, and is given as it was before."""
-
-
-def warn_unfinished(what: str, error: Exception) -> None:
-    """Tell what could not be done, and why."""
-    reason = " ".join(f"{type(error).__name__}: {error}".split())
-    warnings.warn(f"{what}: {reason}", UnfinishedWarning, stacklevel=3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +45,15 @@ class Finished:
         return self.planner.name
 
     def _options(self) -> dict[str, Any]:
-        """What was asked for, as far as it says anything."""
-        own = vars(self.planner).items()
-        options = {name: value for name, value in own if not name.startswith("_")}
-        options |= {"refine": self.refine, "bound": self.bound, "target_gap": self.target_gap}
-        return {name: value for name, value in options.items() if value is not None}
+        """What was asked for, as far as it says anything; the planner's own word is the last."""
+        own = {name: value for name, value in vars(self.planner).items() if name[0] != "_"}
+        asked = {"refine": self.refine, "bound": self.bound, "target_gap": self.target_gap}
+        return {
+            name: value
+            for options in (asked, own)
+            for name, value in options.items()
+            if value is not None
+        }
 
     def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
         """Plan and finish. ``callback`` sees the progress and may stop the planner or the bound.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -129,43 +129,41 @@ class GeodesicTraversal:
         )
 
     def fan(self, problem: Problem, *, callback: Callback | None = None) -> Fan:
-        """Trace all rays and find the geodesics between them.
+        """Trace all rays, and find the geodesic between two of them as soon as both are there.
 
-        A callback that returns True, or Ctrl-C, leaves the fan with the rays it has.
+        A callback that returns True, or Ctrl-C, leaves the fan with what it has.
         """
         started = time.perf_counter()
-        rays: list[Ray] = []
+        misses: list[Miss] = []
+        found: list[Geodesic] = []
         interrupted = False
         try:
             for angle in self._angles(problem):
-                rays.append(self._trace(problem, float(angle)))
+                misses.append(closest_approach(self._trace(problem, float(angle)), problem.goal))
+                found += self._hits(problem, misses[-2:])
                 seconds = time.perf_counter() - started
-                report = Progress(len(rays), self.directions, seconds, math.inf)
+                best = min((geodesic.length for geodesic in found), default=math.inf)
+                report = Progress(len(misses), self.directions, seconds, best)
                 if callback is not None and callback(report):
                     break
         except KeyboardInterrupt:
             interrupted = True
-        misses = tuple(closest_approach(ray, problem.goal) for ray in rays)
-        geodesics = _distinct(self._hits(problem, misses))
-        return Fan(tuple(rays), misses, self._radius(problem), geodesics, interrupted)
+        rays = tuple(miss.ray for miss in misses)
+        return Fan(rays, tuple(misses), self._radius(problem), _distinct(found), interrupted)
 
-    def _hits(self, problem: Problem, misses: tuple[Miss, ...]) -> list[Geodesic]:
-        """Geodesics in free space between all neighbours that pass the goal on two sides."""
-        found = []
-        for low, high in pairwise(misses):
-            if not is_bracket(low, high):
-                continue
-            geodesic = hit(
-                problem.surface,
-                problem.start,
-                problem.goal,
-                (low, high),
-                bounds=problem.bounds,
-                tolerance=self.tolerance,
-            )
-            if geodesic is not None and _is_free(problem, geodesic):
-                found.append(geodesic)
-        return found
+    def _hits(self, problem: Problem, neighbours: Sequence[Miss]) -> list[Geodesic]:
+        """The geodesic in free space between two rays that pass the goal on two sides, if any."""
+        if len(neighbours) < 2 or not is_bracket(*neighbours):
+            return []
+        geodesic = hit(
+            problem.surface,
+            problem.start,
+            problem.goal,
+            (neighbours[0], neighbours[1]),
+            bounds=problem.bounds,
+            tolerance=self.tolerance,
+        )
+        return [geodesic] if geodesic is not None and _is_free(problem, geodesic) else []
 
     def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
         """The shortest geodesic of the fan, its path sampled; ``cost`` is its exact length."""

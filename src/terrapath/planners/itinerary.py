@@ -172,10 +172,12 @@ class _Tour:
 
     def with_share(self, count: int) -> Planner:
         """The planner with its share of the time that is left."""
+        legs = count - 1 + self.goals
         limit = getattr(self.planner, "time_limit", None)
         if limit is None:
-            return self.planner
-        open_legs = max(count - 1 + self.goals - len(self.planned), 1)
+            shared: Planner = _with_equal_share(self.planner, legs)
+            return shared
+        open_legs = max(legs - len(self.planned), 1)
         left = limit - (time.perf_counter() - self.started)
         limited: Planner = _limited(self.planner, max(left, 1e-3) / open_legs)
         return limited
@@ -193,15 +195,33 @@ class _Tour:
         return see
 
 
+def _with_equal_share(planner: Any, legs: int) -> Any:
+    """A planner whose limit, its own or that of the planner within it, is shared by the legs.
+
+    Equally: where only the planner within has a limit, finishing has none, and the clock does
+    not tell how much of the planner's time is left.
+    """
+    limit = getattr(planner, "time_limit", None)
+    if limit is not None:
+        return _limited(planner, limit / legs)
+    if "planner" not in _fields(planner):
+        return planner
+    return replace(planner, planner=_with_equal_share(planner.planner, legs))
+
+
 def _limited(planner: Any, seconds: float) -> Any:
     """A planner with another time limit, and so the planner within it."""
-    names = {entry.name for entry in fields(planner)} if is_dataclass(planner) else set()
+    names = _fields(planner)
     changes: dict[str, Any] = {}
     if "time_limit" in names:
         changes["time_limit"] = seconds
     if "planner" in names:
         changes["planner"] = _limited(planner.planner, seconds)
     return replace(planner, **changes) if changes else planner
+
+
+def _fields(planner: Any) -> set[str]:
+    return {entry.name for entry in fields(planner)} if is_dataclass(planner) else set()
 
 
 def joined(problem: Problem, legs: Sequence[Solution], count: int) -> Solution:

@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ..distinct_routes import routes_of_fields
+from ..distinct_routes import routes_of_fields, shortest
 from ..eikonal import DistanceField, Medium, march_from
-from ..lattice import Lattice
+from ..errors import warn_unfinished
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search
-from .finishing import bounded, warn_unfinished
-
-# Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
-HALVINGS = 2
+from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
+from .finishing import bounded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,9 +87,7 @@ class _Run:
     def find_routes(self) -> None:
         """The locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
-        spacing = self.planner.spacing or problem.default_spacing
-        for _ in range(HALVINGS + 1):
-            lattice = Lattice.spanning(problem.bounds, spacing)
+        for lattice in lattices(problem, self.planner.spacing):
             self.total = self.samples + 2 * lattice.nx * lattice.ny
             medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
             from_start = self.march(problem.start, medium)
@@ -105,7 +100,6 @@ class _Run:
                 if not self.must_stop():
                     self.refine_routes(from_start, from_goal)
                 return
-            spacing *= 0.5
 
     def march(self, end: tuple[float, float], medium: Medium) -> DistanceField:
         problem = self.problem
@@ -114,18 +108,30 @@ class _Run:
         return field
 
     def refine_routes(self, from_start: DistanceField, from_goal: DistanceField) -> None:
+        """Keep each route once it is refined, whatever happens to those that come after it."""
+        problem, count = self.problem, self.planner.routes
+        found: list[Path] = []
+        failures: list[Exception] = []
         try:
-            found = routes_of_fields(
-                self.problem,
+            for route in routes_of_fields(
+                problem,
                 from_start,
                 from_goal,
-                self.planner.routes,
+                count,
+                failed=failures.append,
                 must_stop=self.must_stop,
-            )
+            ):
+                if failures and not found:
+                    # The direct way, which comes first, could not be refined, but it is a way.
+                    found.extend(self.routes)
+                found.append(route)
+                self.routes = shortest(found, count)
         except Exception as error:
-            warn_unfinished("no route could be refined; the path is fast marching's", error)
-            return
-        self.routes = found or self.routes
+            failures.append(error)
+        if failures:
+            some = "not every route could be refined"
+            none = "no route could be refined; the path is fast marching's"
+            warn_unfinished(some if found else none, failures[0])
 
     def answer(self) -> Solution:
         """What was found, without a bound."""

@@ -13,7 +13,9 @@ from .tree_search import TreeOptions, search_tree
 
 @dataclass(frozen=True, kw_only=True)
 class RRT:
-    """Plain RRT: RRT* without neighbours. It ends with the first path (LaValle 1998).
+    """Plain RRT: RRT* without neighbours (LaValle 1998).
+
+    It ends within 512 samples of the first path: so many are taken between two looks at it.
 
     samples : at most this many. step : longest edge, map units; by default a twelfth of
     the region's side. seed : of the one random generator. goal_bias : share of samples

@@ -17,10 +17,11 @@ import numpy.typing as npt
 
 from .._kernels import contacts as kernels
 from .._kernels.newton import Strand
+from ..free_space import Indices
 from ..surface import Surface
 from ..validation import Array
 from .newton import lift, lower
-from .walls import SLACK, Indices, Surroundings
+from .walls import SLACK, Surroundings
 
 NONE = -1
 MOST_ROUNDS = 1500

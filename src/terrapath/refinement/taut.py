@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels import free_space as grids
-from ..free_space import Circle, FreeSpace
+from ..free_space import Circle, FreeSpace, Indices
 from ..problem import Problem
 from ..surface import Surface
 from ..validation import Array
 from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
 from .newton import settle
 from .smooth import correct, curve_through, laid_shares
-from .walls import Indices, Surroundings, surroundings
+from .walls import Surroundings, surroundings
 
 # Between a path and what it touches, as a share of the region's side.
 CLEARANCE = 1e-8

@@ -13,17 +13,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from .._kernels import contacts as kernels
 from .._kernels import free_space as grids
-from ..free_space import FreeSpace
+from ..free_space import FreeSpace, Indices, index_grid, listed
 from ..surface import Mask
 from ..validation import Array, Bounds
-
-Indices = npt.NDArray[np.int64]
 
 # Walls stand behind the places where a path touches them by this share of the clearance.
 SLACK = 0.01
@@ -33,9 +30,6 @@ SHORTENED = 0.98
 CELL_CLEARANCE = 3e-7
 # A corner turns by more than this, radians.
 LEAST_TURN = 1e-9
-
-ITEMS_PER_CELL = 2.0
-MOST_CELLS_A_SIDE = 1024
 
 
 @dataclass(frozen=True)
@@ -181,16 +175,6 @@ def _bounds(bounds: Bounds, clearance: float) -> Outline:
     return Outline(edges, normals, np.full(4, clearance), empty, empty)
 
 
-def _listed(grid: grids.Grid, items: Array) -> tuple[Indices, Indices]:
-    """Which items, segments (m, 4), each cell of the grid holds."""
-    counts = np.zeros(grid.nx * grid.ny + 1, np.int64)
-    grids.list_edges(grid, items, counts, np.empty(0, np.int64))
-    first = np.cumsum(counts)
-    ids = np.empty(first[-1], np.int64)
-    grids.list_edges(grid, items, first[:-1].copy(), ids)
-    return first, ids
-
-
 def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surroundings:
     """Everything around a path. sides : (discs,), of the polygon around each disc."""
     parts = [_bounds(space.bounds, clearance)]
@@ -215,15 +199,11 @@ def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surround
 
 def _indexed(bounds: Bounds, outline: Outline) -> tuple[Any, Any]:
     """Walls for sweeps, and the same walls as a space that segments are tested in."""
-    items = len(outline.edges)
-    side = max(1, min(int(math.sqrt(items / ITEMS_PER_CELL)), MOST_CELLS_A_SIDE))
-    grid = grids.Grid(
-        bounds.x1_min, bounds.x2_min, bounds.width / side, bounds.height / side, side, side
-    )
+    grid = index_grid(bounds, len(outline.edges))
     edges = np.ascontiguousarray(outline.edges)
     tips = np.ascontiguousarray(outline.tips)
-    edge_first, edge_ids = _listed(grid, edges)
-    corner_first, corner_ids = _listed(grid, np.hstack([tips, tips]))
+    edge_first, edge_ids = listed(grids.list_edges, grid, edges)
+    corner_first, corner_ids = listed(grids.list_edges, grid, np.hstack([tips, tips]))
     normals = np.ascontiguousarray(outline.normals)
     walls = kernels.Walls(
         grid, edges, normals, edge_first, edge_ids, tips, corner_first, corner_ids
