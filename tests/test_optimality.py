@@ -15,9 +15,10 @@ from terrapath import scenes
 # The paper's scenes
 
 
+# Over these seeds the mean is 17.02999 and 16.14519; with uninformed samples 17.07784 and 16.15578.
 @pytest.mark.parametrize(
     ("name", "mean", "truth"),
-    [("six-peaks", 17.08, 17.018129404), ("one-peak", 16.16, 16.142532164)],
+    [("six-peaks", 17.036, 17.018129404), ("one-peak", 16.150, 16.142532164)],
 )
 def test_ten_runs_come_close_to_the_true_shortest_length_and_never_below(name, mean, truth):
     problem = scenes.load(name)
