@@ -15,10 +15,11 @@ from pyproj import CRS, Transformer
 from scipy.ndimage import binary_dilation, binary_erosion
 
 import terrapath as tp
+from helpers import one_line
 from terrapath.surface.grid import Grid
 from terrapath.surface.holes import continue_into_holes, fill_small_holes
 from terrapath.surface.resampling import resample
-from test_rasters import DATA, HEIGHTS, NORTH_UP, UTM, centres, one_line, write
+from test_rasters import DATA, HEIGHTS, NORTH_UP, UTM, centres, write
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -10,6 +11,7 @@ import shapely
 
 import planner_oracles as oracles
 import terrapath as tp
+from oracles import great_circle
 from terrapath import scenes
 
 # The paper's scenes
@@ -91,9 +93,7 @@ def _cap(x, y):
     return np.sqrt(100.0 - x * x - y * y)
 
 
-def _great_circle(a, b):
-    p, q = (np.array([*point, _cap(*point)]) for point in (a, b))
-    return 10.0 * math.atan2(np.linalg.norm(np.cross(p, q)), p @ q)
+_great_circle = functools.partial(great_circle, 10.0)
 
 
 def _cylinder(x, y):
