@@ -185,14 +185,6 @@ def unrolled_length(profile, start, goal):
     return math.hypot(float((half * weights * speed).sum()), goal[1] - start[1])
 
 
-def great_circle(radius, a, b):
-    """On the sphere about the origin, between points of the plane."""
-    p, q = (
-        np.array([*point, math.sqrt(radius**2 - point[0] ** 2 - point[1] ** 2)]) for point in (a, b)
-    )
-    return radius * math.atan2(np.linalg.norm(np.cross(p, q)), p @ q)
-
-
 def cauchy_binet(gradients):
     """det(I + sum g g^T) from the 2 x 2 minors: gradients (layers, m, 2)."""
     total = 1.0 + (gradients**2).sum(axis=(0, 2))

@@ -120,18 +120,33 @@ def exact_curve_length(gradients, points, pieces=8):
     return total
 
 
-def line_r(gradients, v1, v2):
-    """Algorithm 1 of the paper, line by line."""
-    v1, v2 = np.asarray(v1, float), np.asarray(v2, float)
+def algorithm_1(speed_at, v1, v2):
+    """Algorithm 1 of the paper, line by line; speed_at(x1, x2): |v2 - v1| in h there."""
     r = []
     for k in range(5):
-        x = k / 4 * v2 + (4 - k) / 4 * v1
-        g = gradients(*x)
-        h = np.eye(2) + sum(np.outer(row, row) for row in g)
-        r.append(
-            math.sqrt(sum(h[i, j] * (v2 - v1)[i] * (v2 - v1)[j] for i in (0, 1) for j in (0, 1)))
-        )
+        x1 = k / 4 * v2[0] + (4 - k) / 4 * v1[0]
+        x2 = k / 4 * v2[1] + (4 - k) / 4 * v1[1]
+        r.append(speed_at(x1, x2))
     return 7 / 90 * r[0] + 16 / 45 * r[1] + 2 / 15 * r[2] + 16 / 45 * r[3] + 7 / 90 * r[4]
+
+
+def line_r(gradients, v1, v2):
+    """Algorithm 1 with h written down: gradients(x, y) -> (layers, 2), weighted."""
+    v = np.subtract(v2, v1)
+
+    def speed_at(x1, x2):
+        h = np.eye(2) + sum(np.outer(row, row) for row in gradients(x1, x2))
+        return math.sqrt(v @ h @ v)
+
+    return algorithm_1(speed_at, v1, v2)
+
+
+def great_circle(radius, a, b):
+    """On the sphere about the origin, between points of the plane."""
+    p, q = (
+        np.array([*point, math.sqrt(radius**2 - point[0] ** 2 - point[1] ** 2)]) for point in (a, b)
+    )
+    return radius * math.atan2(np.linalg.norm(np.cross(p, q)), p @ q)
 
 
 # Free space. a and b are (..., 2); a geometry is a closed set, a circle is (x, y, radius).

@@ -16,14 +16,14 @@ import numpy as np
 import shapely
 from scipy.integrate import quad
 
+from oracles import algorithm_1
+
 # Those with the options of a tree: samples, step, seed and goal bias.
 TREE_PLANNERS = ["rrt", "rrt-star", "rrt-star-r"]
 
 Peak = tuple[float, float, float, float]
 Layers = Sequence[Sequence[Peak]]
 Point = tuple[float, float]
-
-BOOLE = (7.0 / 90.0, 16.0 / 45.0, 2.0 / 15.0, 16.0 / 45.0, 7.0 / 90.0)
 
 
 # The surface
@@ -55,16 +55,6 @@ def chord(layers: Layers, a: Point, b: Point) -> float:
     return math.dist(lifted(layers, *a), lifted(layers, *b))
 
 
-def boole(layers: Layers, a: Point, b: Point) -> float:
-    """Algorithm 1 of the paper, line by line."""
-    total = 0.0
-    for k, weight in enumerate(BOOLE):
-        x = k / 4 * b[0] + (4 - k) / 4 * a[0]
-        y = k / 4 * b[1] + (4 - k) / 4 * a[1]
-        total += weight * speed(layers, x, y, b[0] - a[0], b[1] - a[1])
-    return total
-
-
 def line_r(layers: Layers, a: Point, b: Point, panel: float) -> float:
     """Algorithm 1 on each of the equal pieces of a-b that are at most ``panel`` long."""
     pieces = max(math.ceil(math.dist(a, b) / panel), 1)
@@ -72,7 +62,11 @@ def line_r(layers: Layers, a: Point, b: Point, panel: float) -> float:
         (a[0] + k / pieces * (b[0] - a[0]), a[1] + k / pieces * (b[1] - a[1]))
         for k in range(pieces + 1)
     ]
-    return sum(boole(layers, p, q) for p, q in pairwise(ends))
+    total = 0.0
+    for p, q in pairwise(ends):
+        dx, dy = q[0] - p[0], q[1] - p[1]
+        total += algorithm_1(lambda x, y, dx=dx, dy=dy: speed(layers, x, y, dx, dy), p, q)
+    return total
 
 
 def polyline_length(layers: Layers, points: np.ndarray) -> float:

@@ -308,7 +308,7 @@ def test_the_goal_of_the_papers_scenes(name):
     assert float(field.at(problem.goal)) == pytest.approx(truth, rel=1e-3)
     path = field.path_to(problem.goal)
     assert truth <= path.length * (1.0 + 1e-9)
-    assert path.length <= 1.01 * truth
+    assert path.length <= 1.001 * truth  # six-peaks: 1.00033, the others at most 1.00006
     assert tuple(path.points[0]) == problem.start
     assert tuple(path.points[-1]) == problem.goal
 

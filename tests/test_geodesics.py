@@ -15,6 +15,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
 import terrapath as tp
+from helpers import numbers, points_in
 from oracles import (
     christoffel_from_sympy,
     curvature_from_brioschi,
@@ -43,10 +44,6 @@ SIX_PEAKS = [scenes.FOUR_PEAKS, scenes.TWO_RESISTANCE_PEAKS]
 RADIUS = 10.0
 
 
-def numbers(low, high):
-    return st.floats(low, high, allow_subnormal=False)
-
-
 peak = st.tuples(numbers(-6.0, 6.0), numbers(0.02, 1.0), numbers(-1.0, 11.0), numbers(-1.0, 11.0))
 layer_lists = st.lists(st.lists(peak, min_size=1, max_size=3), min_size=1, max_size=4)
 many_layers = st.lists(st.lists(peak, min_size=1, max_size=3), min_size=1, max_size=6)
@@ -55,10 +52,6 @@ cubics = st.lists(st.lists(numbers(-0.3, 0.3), min_size=9, max_size=9), min_size
 point = st.tuples(numbers(0.0, 10.0), numbers(0.0, 10.0))
 angles = numbers(-math.pi, math.pi)
 seeds = st.integers(0, 2**32 - 1)
-
-
-def points_in(bounds, count, seed):
-    return np.random.default_rng(seed).uniform(bounds[:2], bounds[2:], (count, 2))
 
 
 def peaks_surface(layers, weights=None):

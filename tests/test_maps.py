@@ -12,14 +12,15 @@ import rasterio
 import xarray
 from affine import Affine
 from pyproj import CRS, Transformer
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, binary_erosion
 
 import terrapath as tp
+from helpers import one_line
 from terrapath.cli.main import run
 from terrapath.surface.grid import Grid
 from terrapath.surface.holes import continue_into_holes, fill_small_holes
 from terrapath.surface.resampling import resample
-from test_rasters import DATA, HEIGHTS, NORTH_UP, UTM, centres, one_line, write
+from test_rasters import DATA, HEIGHTS, NORTH_UP, UTM, centres, write
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
@@ -564,14 +565,16 @@ def test_the_ground_goes_on_into_holes_without_a_crease_at_their_edge():
     continue_into_holes(values, missing)
     assert np.isfinite(values).all()
     np.testing.assert_array_equal(values[~missing], plane[~missing])
-    rim = np.pad(missing, 1)[2:, 1:-1] & np.pad(missing, 1)[:-2, 1:-1] & missing
-    first = missing & ~rim
-    np.testing.assert_allclose(values[first], plane[first], atol=3.0)
-    assert values.min() > plane.min() - 5.0
-    assert values.max() < plane.max() + 5.0
+    edge = missing & ~binary_erosion(missing)
+    # The nearest cells' values are 0.5 to 0.8 off.
+    np.testing.assert_allclose(values[edge], plane[edge], rtol=0.0, atol=1e-9)
+    # Further in the ground levels off: nowhere above or below what the plane has in the hole.
+    assert values[missing].min() >= plane[missing].min() - 1e-9
+    assert values[missing].max() <= plane[missing].max() + 1e-9
 
 
-@pytest.mark.parametrize("seed", range(4))
+# Of 200 seeds 105 is the worst in slope (0.0534 of it) and 130 in height (0.023 cells' rise).
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 105, 130])
 def test_a_spline_does_not_ring_at_the_edge_of_a_hole(tmp_path, seed):
     """On ground of one slope the surface between cells with data is that ground."""
     random = np.random.default_rng(seed)
@@ -589,9 +592,11 @@ def test_a_spline_does_not_ring_at_the_edge_of_a_hole(tmp_path, seed):
     free = ~missing[tuple(cells)]
     assert 500 < free.sum() < len(free)
     off = (surface.gradients(points) - whole.gradients(points))[free, 0]
-    # With the nearest cells' values in the hole 1.2 to 1.9 times the slope, and 0.7 to 1.4 cells.
-    assert np.abs(off).max() < 0.06 * np.hypot(*slope)
-    assert np.abs((surface.values(points) - whole.values(points))[free]).max() < 0.05 * 10.0
+    # With the nearest cells' values 1.4 to 1.7 times the slope, and 0.5 to 0.9 cells' rise.
+    steepness = np.hypot(*slope)
+    assert np.hypot(*off.T).max() < 0.06 * steepness
+    risen = np.abs((surface.values(points) - whole.values(points))[free])
+    assert risen.max() < 0.03 * 10.0 * steepness
 
 
 @pytest.mark.parametrize("dy", [1.0, 2.5])

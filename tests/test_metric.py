@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import RectBivariateSpline
 
 import terrapath as tp
+from helpers import numbers, points_in
 from oracles import (
     exact_curve_length,
     metric_from_sympy,
@@ -22,10 +23,6 @@ from terrapath import metric
 BOUNDS = (-1.0, -1.0, 11.0, 11.0)
 
 
-def numbers(low, high):
-    return st.floats(low, high, allow_subnormal=False)
-
-
 peak = st.tuples(numbers(-6.0, 6.0), numbers(0.02, 2.0), numbers(-1.0, 11.0), numbers(-1.0, 11.0))
 layer_lists = st.lists(st.lists(peak, min_size=1, max_size=3), min_size=1, max_size=3)
 weight_lists = st.lists(numbers(0.0, 5.0), min_size=3, max_size=3)
@@ -36,10 +33,6 @@ SIX_PEAKS = [
     [(5, 0.5, 3, 3), (5, 0.5, 7, 3), (5, 0.5, 3, 7), (5, 0.5, 7, 7)],
     [(3, 0.5, 5, 8), (3, 0.5, 5, 2)],
 ]
-
-
-def points_in(bounds, count, seed):
-    return np.random.default_rng(seed).uniform(bounds[:2], bounds[2:], (count, 2))
 
 
 def weighted(layers, weights):

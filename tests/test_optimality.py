@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -10,14 +11,16 @@ import shapely
 
 import planner_oracles as oracles
 import terrapath as tp
+from oracles import great_circle
 from terrapath import scenes
 
 # The paper's scenes
 
 
+# Over these seeds the mean is 17.02999 and 16.14519; with uninformed samples 17.07784 and 16.15578.
 @pytest.mark.parametrize(
     ("name", "mean", "truth"),
-    [("six-peaks", 17.08, 17.018129404), ("one-peak", 16.16, 16.142532164)],
+    [("six-peaks", 17.036, 17.018129404), ("one-peak", 16.150, 16.142532164)],
 )
 def test_ten_runs_come_close_to_the_true_shortest_length_and_never_below(name, mean, truth):
     problem = scenes.load(name)
@@ -90,9 +93,7 @@ def _cap(x, y):
     return np.sqrt(100.0 - x * x - y * y)
 
 
-def _great_circle(a, b):
-    p, q = (np.array([*point, _cap(*point)]) for point in (a, b))
-    return 10.0 * math.atan2(np.linalg.norm(np.cross(p, q)), p @ q)
+_great_circle = functools.partial(great_circle, 10.0)
 
 
 def _cylinder(x, y):

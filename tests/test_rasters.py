@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pyproj import CRS, Geod, Transformer
 
 import terrapath as tp
+from helpers import one_line
 from oracles import is_blocked
 from terrapath.io.maps import LayerSource
 from terrapath.surface.georeference import Georeference
@@ -55,13 +56,6 @@ def centres(transform=NORTH_UP, shape=(12, 10)):
     columns, rows = np.meshgrid(np.arange(shape[1]) + 0.5, np.arange(shape[0]) + 0.5)
     t = transform
     return np.stack([t.a * columns + t.b * rows + t.c, t.d * columns + t.e * rows + t.f], axis=-1)
-
-
-def one_line(caught):
-    text = str(caught.value)
-    assert text
-    assert "\n" not in text
-    return text
 
 
 # Values

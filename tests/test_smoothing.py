@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from scipy.ndimage import gaussian_filter1d
 
 import terrapath as tp
+from helpers import one_line, points_in
 from terrapath.experiments import nonsmooth
 from terrapath.surface.smoothing import quantisation_step, scale_for_step, smooth
 
@@ -23,24 +24,12 @@ def axes(x=(-5.0, 5.0, 81), y=(-4.0, 3.0, 61)):
     return np.linspace(*x), np.linspace(*y)
 
 
-def points_in(bounds, count, seed=0):
-    random = np.random.default_rng(seed)
-    return random.uniform(bounds[:2], bounds[2:], (count, 2))
-
-
 def cone(x, y):
     return 3.0 - np.hypot(x, y)
 
 
 def cliff(x, y):
     return np.heaviside(x, 0.5) + 0.0 * y
-
-
-def one_line(caught):
-    text = str(caught.value)
-    assert text
-    assert "\n" not in text
-    return text
 
 
 # What smoothing does to values

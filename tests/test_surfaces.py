@@ -7,14 +7,11 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 import terrapath as tp
+from helpers import numbers, one_line, points_in
 from oracles import peaks_derivative_from_sympy, peaks_expressions, peaks_function
 
 BOUNDS = (-1.0, -1.0, 11.0, 11.0)
 JET = [(), ("x1",), ("x2",), ("x1", "x1"), ("x1", "x2"), ("x2", "x2")]
-
-
-def numbers(low, high):
-    return st.floats(low, high, allow_subnormal=False)
 
 
 peak = st.tuples(
@@ -25,11 +22,6 @@ peak = st.tuples(
 )
 layer_lists = st.lists(st.lists(peak, min_size=1, max_size=4), min_size=1, max_size=4)
 seeds = st.integers(0, 2**32 - 1)
-
-
-def points_in(bounds, count, seed):
-    random = np.random.default_rng(seed)
-    return random.uniform(bounds[:2], bounds[2:], (count, 2))
 
 
 def jets(surface, points):
@@ -45,13 +37,6 @@ def jets(surface, points):
         ],
         axis=-1,
     )
-
-
-def one_line(caught):
-    text = str(caught.value)
-    assert text
-    assert "\n" not in text
-    return text
 
 
 # Peaks

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..figures import new_figure, save_figure
 from .bound import GAP_TARGETS, BoundData
 from .marching import REFERENCE_ERRORS, MarchData, MarchRow
@@ -17,9 +19,14 @@ TARGET_COLOUR = "#e4002b"
 LEAST_EXCESS = 1e-9
 
 
+def _plain_percent(share: float) -> str:
+    """As ``percent``, but small ones are written out."""
+    return f"{np.format_float_positional(100.0 * share, 3, fractional=False, trim='-')} %"
+
+
 def label_percent(axis: Any) -> None:
     """Ticks of an axis in percent."""
-    axis.set_major_formatter(lambda value, _: percent(value))
+    axis.set_major_formatter(lambda value, _: _plain_percent(value))
     axis.set_minor_formatter("")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.ticker import LogLocator
 
 from ..figures import new_figure, save_figure
-from .figures import TARGET_COLOUR, label_percent, label_plain
+from .figures import LEAST_EXCESS, TARGET_COLOUR, label_percent, label_plain
 from .grids import METHODS, GridsData
 from .growth import GROWTH_TARGET, GrowthData
 from .trees import NEAR, Best, SceneTrees, TreesData
@@ -17,9 +17,6 @@ from .trees import NEAR, Best, SceneTrees, TreesData
 # Colours by program, lines by planner.
 COLOURS = {"terrapath": "#08519c", "ompl-cpp": "#d95f0e", "ompl-python": "#7f7f7f"}
 LINES = {"rrt-star-r": "-", "rrt-star": "-", "informed-rrt-star": "--", "bit-star": ":"}
-
-# Excesses below this are not shown.
-LEAST_EXCESS = 1e-5
 
 
 def _line(best: Best) -> Any:
@@ -91,7 +88,7 @@ def draw_grids(data: GridsData, directory: Path) -> list[Path]:
         axes.grid(alpha=0.3)
         label_plain(axes.xaxis)
         label_percent(axes.yaxis)
-    panels[0, 0].set_ylabel("error of the distance, absolute")
+    panels[0, 0].set_ylabel("error of the distance, without its sign")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right upper", fontsize=9)
     path = directory / "benchmark-grids.png"
