@@ -79,6 +79,15 @@ def test_the_title_tells_the_bound_and_that_a_path_is_refined(solution, problem)
     assert f"no path is shorter than 16.9000, a gap of {100 * proven.gap:.3g} %" in title
 
 
+def test_heights_and_contours_of_a_further_layer_are_named():
+    solution = tp.RRT().solve(tp.scenes.load("six-peaks"))
+    plane, *others = draw_route(solution).axes
+    (perspective,) = (axes for axes in others if axes.name == "3d")
+    assert "height" in [text.get_text() for text in perspective.texts]
+    shown = [text.get_text() for text in plane.get_legend().get_texts()]
+    assert "contours: resistance" in shown
+
+
 def test_other_routes_are_drawn_thinner_and_dashed_with_their_lengths(problem):
     paths = [problem.path([(0, 0), (bow, 10 - bow), (10, 10)]) for bow in (3, 2, 6.5)]
     solution = replace(

@@ -160,6 +160,9 @@ def draw_smoothing(data: list[SmoothedPath], settings: Settings, directory: Path
     for name, rows in by_surface(data).items():
         errors = np.array([row.relative_error for row in rows])
         draw_orders(axes, [row.scale for row in rows], errors, name)
+    axes.set_xticks(sorted({row.scale for row in data}))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")
     axes.set_title("geodesics of smoothed surfaces against those of the sharp ones")
     path = directory / "smoothing.png"
     save_figure(figure, path)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import shapely
-from matplotlib import patheffects
+from matplotlib import colormaps, patheffects
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.patches import Circle as Disc
@@ -122,6 +122,8 @@ def _draw_contours(axes: Any, terrain: Terrain) -> None:
         style = {"cmap": LAYER_COLOURS, "linewidths": 0.8, "alpha": 0.9}
         smooth = gaussian_filter(others[0], LAYER_SMOOTHING)
         axes.contour(terrain.x, terrain.y, smooth, LAYER_CONTOURS, **style)
+        colour, label = colormaps[LAYER_COLOURS](0.5), f"contours: {terrain.label(1)}"
+        axes.plot([], [], color=colour, lw=1.5, label=label)
 
 
 def _draw_tree(axes: Any, solution: Solution) -> None:

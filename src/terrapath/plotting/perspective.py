@@ -108,6 +108,9 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     axes.view_init(elev=ELEVATION, azim=AZIMUTH)
     _draw_path(axes, solution, terrain, box, np.array([bounds.width, bounds.height, high - low]))
     label_axes(axes, problem)
+    # Above the corner where its axis stands: beside it lie its numbers and the picture's edge.
+    above = high + 0.25 * (high - low)
+    axes.text(bounds.x1_min, bounds.x2_max, above, terrain.label(0), ha="center", va="bottom")
     axes.zaxis.set_major_locator(_few_ticks())
     cmap = height_colours() if layer == 0 else colormaps[LAYER_COLOURS]
     if layer == 1:

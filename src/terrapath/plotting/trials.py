@@ -39,7 +39,10 @@ def draw_box(axes: Any, lengths: Sequence[float], true_length: float, title: str
 def draw_orders(axes: Any, scales: Sequence[float], errors: Array, name: str) -> None:
     """Relative errors against a length scale, on logarithmic axes; scales, errors: (k,)."""
     axes.loglog(scales, np.abs(errors), "o-", lw=1.6, ms=5, label=name)
-    axes.set(xlabel="scale of the smoothing (map units)", ylabel="relative error of the length")
+    axes.set(
+        xlabel="scale of the smoothing (map units)",
+        ylabel="relative error of the length, without its sign",
+    )
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=9)
 

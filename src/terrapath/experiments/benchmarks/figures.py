@@ -92,7 +92,7 @@ def _draw_errors(axes: Any, rows: dict[str, list[MarchRow]]) -> None:
         known = [(n, abs(error)) for (s, n), error in REFERENCE_ERRORS.items() if s == scene]
         label = f"{scene}, HamiltonFastMarching"
         axes.loglog(*zip(*known, strict=True), "D", mfc="none", ms=8, color=f"C{k}", label=label)
-    axes.set(ylabel="relative error, absolute", title="error at the goal")
+    axes.set(ylabel="relative error, without its sign", title="error at the goal")
     label_percent(axes.yaxis)
 
 
@@ -130,9 +130,16 @@ MARKS = {
 }
 
 
+TREES_END = " samples"  # labels of trees do
+
+
 def _draw_planners(axes: Any, labels: list[str], found: list[PathsFound]) -> None:
+    trees = []
     for label, result in zip(labels, found, strict=True):
         name = label.replace("\\", "")
+        if name.endswith(TREES_END):
+            trees.append((name, result))
+            continue
         marker, colour = next(mark for start, mark in MARKS.items() if name.startswith(start))
         axes.loglog(
             result.timing.seconds,
@@ -143,9 +150,33 @@ def _draw_planners(axes: Any, labels: list[str], found: list[PathsFound]) -> Non
             ms=11 if marker == "*" else 7,
             label=name,
         )
-    trees = [r for label, r in zip(labels, found, strict=True) if label.endswith("samples")]
-    seconds, excess = [r.timing.seconds for r in trees], [r.typical_excess for r in trees]
-    axes.loglog(seconds, excess, "-", lw=1.0, color=MARKS["RRT*-R"][1])
+    _draw_tree_sizes(axes, trees)
+
+
+def _draw_tree_sizes(axes: Any, trees: list[tuple[str, PathsFound]]) -> None:
+    """One planner with several numbers of samples: one line, which the legend names once."""
+    planner = trees[0][0].split(",")[0]
+    *others, last = (name.removeprefix(f"{planner}, ") for name, _ in trees)
+    listed = ", ".join(size.removesuffix(TREES_END) for size in others)
+    sizes = f"{listed} and {last}" if others else last
+    marker, colour = MARKS[planner]
+    axes.loglog(
+        [result.timing.seconds for _, result in trees],
+        [max(result.typical_excess, LEAST_EXCESS) for _, result in trees],
+        f"{marker}-",
+        color=colour,
+        lw=1.0,
+        ms=7,
+        label=f"{planner}, {sizes}",
+    )
+
+
+def _draw_targets(axes: Any, scene: str) -> None:
+    style = {"color": TARGET_COLOUR, "lw": 1.2}
+    axes.axhline(NEAR, ls=":", label=f"near: within {percent(NEAR)}", **style)
+    if scene == TARGET_SCENE:
+        label = f"target on {scene}: near in {TARGET_SECONDS:g} s"
+        axes.axvline(TARGET_SECONDS, ls="--", label=label, **style)
 
 
 def draw_paths(data: PathsData, directory: Path) -> list[Path]:
@@ -156,9 +187,7 @@ def draw_paths(data: PathsData, directory: Path) -> list[Path]:
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for axes, (scene, found) in zip(panels.flat, data.found.items(), strict=False):
         _draw_planners(axes, data.labels, found)
-        axes.axhline(NEAR, color=TARGET_COLOUR, ls=":", lw=1.2)
-        if scene == TARGET_SCENE:
-            axes.axvline(TARGET_SECONDS, color=TARGET_COLOUR, ls=":", lw=1.2)
+        _draw_targets(axes, scene)
         axes.set_title(scene)
         axes.grid(alpha=0.3)
         label_plain(axes.xaxis)
@@ -167,8 +196,9 @@ def draw_paths(data: PathsData, directory: Path) -> list[Path]:
         axes.set_xlabel("seconds")
     for axes in panels[:, 0]:
         axes.set_ylabel("longer than the shortest by")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right upper", fontsize=9)
+    shown = [panel.get_legend_handles_labels() for panel in panels.flat]
+    entries = {label: handle for row in shown for handle, label in zip(*row, strict=True)}
+    figure.legend(entries.values(), entries.keys(), loc="outside right upper", fontsize=9)
     path = directory / "benchmark-path.png"
     save_figure(figure, path)
     return [path]

@@ -12,6 +12,7 @@ from ..figures import new_figure, save_figure
 from .figures import LEAST_EXCESS, TARGET_COLOUR, label_percent, label_plain
 from .grids import METHODS, GridsData
 from .growth import GROWTH_TARGET, GrowthData
+from .timing import percent
 from .trees import NEAR, Best, SceneTrees, TreesData
 
 # Colours by program, lines by planner.
@@ -21,8 +22,6 @@ LINES = {"rrt-star-r": "-", "rrt-star": "-", "informed-rrt-star": "--", "bit-sta
 
 def _line(best: Best) -> Any:
     options = dict(best.options)
-    if best.contender.late:
-        return (0, (6, 1, 1, 1, 1, 1))
     if options.get("refine") or options.get("new_state_rejection"):
         return "-."
     return "--" if options.get("informed") else LINES[best.contender.planner]
@@ -44,7 +43,9 @@ def _draw_scene_trees(axes: Any, scene: SceneTrees) -> None:
         style = _line(best)
         colour = COLOURS[contender.program]
         name = label.replace("\\", "")
-        axes.loglog(seconds, middle, ls=style, color=colour, lw=1.8, label=name)
+        # The same planner with other options: beside it, but not before it.
+        strength = {"lw": 1.0, "alpha": 0.5} if contender.late else {"lw": 1.8}
+        axes.loglog(seconds, middle, ls=style, color=colour, label=name, **strength)
         shown = [value if math.isfinite(value) else middle[k] for k, value in enumerate(high)]
         axes.fill_between(seconds, low, shown, color=colour, alpha=0.12, lw=0.0)
 
@@ -57,7 +58,8 @@ def draw_trees(data: TreesData, directory: Path) -> list[Path]:
     panels = figure.subplots(rows, columns, squeeze=False)
     for axes, (name, scene) in zip(panels.flat, data.scenes.items(), strict=False):
         _draw_scene_trees(axes, scene)
-        axes.axhline(NEAR, color=TARGET_COLOUR, ls=":", lw=1.2)
+        label = f"target: within {percent(NEAR)}"
+        axes.axhline(NEAR, color=TARGET_COLOUR, ls=":", lw=1.2, label=label)
         axes.set(title=name, xlabel="seconds", ylabel="longer than the shortest by")
         axes.grid(alpha=0.3)
         label_plain(axes.xaxis)
@@ -107,8 +109,9 @@ def draw_growth(data: GrowthData, directory: Path) -> list[Path]:
         axes.loglog(samples, seconds, "o-", color=f"C{k}", label=name)
         power = math.log10(GROWTH_TARGET)
         allowed = [seconds[0] * (count / samples[0]) ** power for count in samples]
-        axes.loglog(samples, allowed, ":", color=TARGET_COLOUR, lw=1.2)
-    axes.set(xlabel="samples", ylabel="seconds", title="growth, and the most allowed")
+        (limit,) = axes.loglog(samples, allowed, ":", color=TARGET_COLOUR, lw=1.2)
+    limit.set_label(f"{GROWTH_TARGET:g} times the seconds for ten times the samples")
+    axes.set(xlabel="samples", ylabel="seconds", title="RRT*-R: growth")
     axes.set_xticks(sorted({row.samples for row in data.rows}))
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     label_plain(axes.xaxis)
