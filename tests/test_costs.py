@@ -86,6 +86,22 @@ def test_a_cost_is_nowhere_beyond_the_samples_around(seed):
     assert surface.least_cost <= found.min()
 
 
+steps = st.lists(st.floats(1.0, 4.0), min_size=4, max_size=9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(steps, steps, st.integers(0, 10**6))
+def test_on_unequal_steps_a_cost_stays_within_the_samples(across, up, seed):
+    x, y = (np.cumsum([0.0, *sizes]) for sizes in (across, up))
+    random = np.random.default_rng(seed)
+    cost = 10.0 ** random.choice([-3.0, 0.0, random.uniform(-3.0, 3.0)], (len(y), len(x)))
+    surface = tp.Surface.from_grid([0.0 * cost, cost], x, y, kinds=["rise", "cost"])
+    found = surface.cost(random.uniform((0.0, 0.0), (x[-1], y[-1]), (2000, 2)))
+    assert found.min() >= cost.min() * (1.0 - 1e-12)
+    assert found.max() <= cost.max() * (1.0 + 1e-12)
+    assert cost.min() * (1.0 - 1e-12) <= surface.least_cost <= found.min() * (1.0 + 1e-12)
+
+
 def test_weights_of_costs_are_exponents_and_costs_multiply():
     surface = random_surface(np.random.default_rng(1), costs=2)
     points = np.random.default_rng(2).uniform(0.0, SIDE, (50, 2))
