@@ -289,7 +289,9 @@ def fit_function(
         value_errors, gradient_error = _errors(f, gradient, spline, bounds)
         worst, spacing = float(value_errors.max()), max(spline.dx, spline.dy)
         spread = values.max(axis=(1, 2)) - values.min(axis=(1, 2))
-        if resolution is None and (value_errors <= COARSE_TOLERANCE * spread).all():
+        # Of a layer that is constant, rounding apart, there is no shape to see.
+        seen = np.maximum(COARSE_TOLERANCE * spread, SAFETY * tolerance)
+        if resolution is None and (value_errors <= seen).all():
             resolution = spacing
         if max(worst, gradient_error) <= SAFETY * tolerance:
             shape = (samples, samples)
