@@ -12,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
 import terrapath as tp
-from terrapath import metric
+from terrapath import metric, refinement
 from terrapath.errors import CertificateError, InputError
 from terrapath.geodesics import (
     christoffel_symbols,
@@ -84,6 +84,22 @@ def test_a_cost_is_nowhere_beyond_the_samples_around(seed):
     assert found.min() >= 0.5 * (1.0 - 1e-12)
     assert found.max() <= 20.0 * (1.0 + 1e-12)
     assert surface.least_cost <= found.min()
+
+
+steps = st.lists(st.floats(1.0, 4.0), min_size=4, max_size=9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(steps, steps, st.integers(0, 10**6))
+def test_on_unequal_steps_a_cost_stays_within_the_samples(across, up, seed):
+    x, y = (np.cumsum([0.0, *sizes]) for sizes in (across, up))
+    random = np.random.default_rng(seed)
+    cost = 10.0 ** random.choice([-3.0, 0.0, random.uniform(-3.0, 3.0)], (len(y), len(x)))
+    surface = tp.Surface.from_grid([0.0 * cost, cost], x, y, kinds=["rise", "cost"])
+    found = surface.cost(random.uniform((0.0, 0.0), (x[-1], y[-1]), (2000, 2)))
+    assert found.min() >= cost.min() * (1.0 - 1e-12)
+    assert found.max() <= cost.max() * (1.0 + 1e-12)
+    assert cost.min() * (1.0 - 1e-12) <= surface.least_cost <= found.min() * (1.0 + 1e-12)
 
 
 def test_weights_of_costs_are_exponents_and_costs_multiply():
@@ -245,6 +261,40 @@ def test_a_constant_cost_scales_every_length(factor):
         np.testing.assert_allclose(other.cost, scale * one.cost, rtol=1e-6)
         bounds = [tp.lower_bound(s.problem, length=s.length) for s in (one, other)]
         assert float(bounds[1]) == pytest.approx(factor * float(bounds[0]), rel=1e-3)
+
+
+def bumpy(cost, seed=0, count=40):
+    """Waves under a cost, a number or a function of x."""
+    axis = np.arange(float(count))
+    waves = np.random.default_rng(seed).normal(size=(4, 4))
+    x, y = np.meshgrid(axis, axis)
+    ground = sum(np.sin(0.4 * (a * x + b * y) + p) * np.cos(0.4 * q * x) for a, b, p, q in waves)
+    layers = [ground, cost(x) if callable(cost) else np.full_like(ground, cost)]
+    return tp.Surface.from_grid(layers, axis, axis, kinds=["rise", "cost"])
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-5.0, 4.0), st.integers(0, 10**6))
+def test_a_constant_cost_scales_the_refined_length(exponent, seed):
+    factor = 10.0**exponent
+    random = np.random.default_rng(seed)
+    points = np.column_stack([np.linspace(2.0, 37.0, 12), random.uniform(10.0, 30.0, 12)])
+    one, other = (
+        tp.refine(tp.Problem(bumpy(c, seed), points[0], points[-1]), points).length
+        for c in (1.0, factor)
+    )
+    assert other == pytest.approx(factor * one, rel=1e-9)
+
+
+def test_a_refined_path_is_as_exact_where_the_cost_is_least(monkeypatch):
+    """Pieces are equally long under h, so those on cheap ground reach far."""
+    surface = bumpy(lambda x: 0.1 * 10.0 ** (1.0 / (1.0 + np.exp(-(x - 20.0) / 2.0))))
+    problem = tp.Problem(surface, (2.0, 20.0), (37.0, 14.0))
+    path = tp.plan(problem, "fast-marching").path
+    refined = tp.refine(problem, path, tolerance=1e-9)
+    monkeypatch.setattr(refinement, "FEWEST_PIECES", 2048)
+    finer = tp.refine(problem, path, tolerance=1e-9)
+    assert refined.length == pytest.approx(finer.length, rel=1e-10)
 
 
 @pytest.mark.parametrize("informed", [True, False])

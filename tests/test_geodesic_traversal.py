@@ -318,6 +318,21 @@ def test_the_callback_sees_each_geodesic_and_ends_the_fan_there():
     assert solution.samples == len(seen) < 40
 
 
+@pytest.mark.parametrize(
+    ("start", "goal"),
+    [((0, 1), (0.5, 9)), ((0, 0), (9, 10)), ((10, 0), (10, 9)), ((4, 10), (5, 0.5))],
+)
+def test_from_the_edge_of_the_bounds_the_geodesics_are_those_of_wider_bounds(start, goal):
+    surface = tp.Surface.from_peaks([[(1.0, 0.1, 5.0, 5.0)]])
+    planner = tp.GeodesicTraversal(directions=60)
+    near, wide = (
+        planner.fan(tp.Problem(surface, start, goal, bounds)).geodesics
+        for bounds in ((0, 0, 10, 10), (-5, -5, 15, 15))
+    )
+    inside = [g.length for g in wide if g.points.min() >= -1e-12 and g.points.max() <= 10.0 + 1e-12]
+    assert [g.length for g in near] == pytest.approx(inside, rel=1e-11)
+
+
 # Options
 
 

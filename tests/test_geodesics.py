@@ -30,6 +30,7 @@ from processes import in_another_process
 from terrapath import geodesics, metric, scenes
 from terrapath.geodesics import (
     christoffel_symbols,
+    closest_approach,
     exponential_map,
     gaussian_curvature,
     geodesic_acceleration,
@@ -366,6 +367,33 @@ def test_a_ray_traced_back_comes_home(layers, weights, start, angle):
     # Both ways the same field: |j| over the factor of the angle at either end (Clairaut).
     here, away = (planar_factor(surface, r.points[0], r.angle) for r in (there, back))
     assert abs(there.jacobi[-1] / here - back.jacobi[-1] / away) <= 1e-7 * growth
+
+
+EDGES = [(x, y) for x in (0.0, 4.0, 10.0) for y in (0.0, 6.0, 10.0) if (x, y) != (4.0, 6.0)]
+
+
+@pytest.mark.parametrize("start", EDGES)
+def test_a_ray_from_the_edge_outwards_is_its_start_alone(start):
+    surface, bounds, target = peaks_surface(ONE_PEAK), Bounds(0.0, 0.0, 10.0, 10.0), (4.0, 6.0)
+    alone = 0
+    for angle in np.append(np.linspace(-math.pi, math.pi, 17), [0.1, 1.57, 1.571, -3.0]):
+        ray = trace_ray(surface, start, angle, 30.0, bounds=bounds)
+        way = np.array([math.cos(angle), math.sin(angle)])
+        miss = closest_approach(ray, target)
+        assert (np.diff(ray.arc_length) > 0.0).all()
+        assert ray.left_surface
+        assert ray.leaves_at_once == (len(ray.points) == 1)
+        assert (ray.conjugate_points <= ray.length).all()
+        if not bounds.contains(np.array(start) + 1e-3 * way):
+            alone += ray.leaves_at_once
+            assert ray.length < 0.1  # one along the edge may bend back before it leaves
+        if ray.leaves_at_once:
+            offset = np.subtract(target, start)
+            assert (miss.arc_length, ray.conjugate_points.size) == (0.0, 0)
+            assert miss.distance == math.dist(start, target)
+            assert miss.side * (way[0] * offset[1] - way[1] * offset[0]) >= 0.0
+            assert tuple(ray.position(0.0)) == start
+    assert alone >= 7
 
 
 # Surfaces whose geodesics are known

@@ -205,6 +205,23 @@ def test_a_refined_path_stays_as_it_is(name):
     assert len(again.points) == pytest.approx(len(once.points), abs=2)
 
 
+@pytest.mark.parametrize("scale", [1e-5, 1e5])
+def test_the_unit_of_the_map_makes_no_difference(scale):
+    peaks = [(2.0, 0.3, 4.0, 5.2), (1.5, 0.5, 6.5, 4.4), (1.0, 1.0, 3.0, 3.0)]
+    given = np.array([(1.0, 5.0), (3.0, 3.2), (5.0, 5.4), (7.0, 6.0), (9.0, 5.0)])
+
+    def found(k):
+        surface = tp.Surface.from_peaks([[(k * a, f / k**2, k * x, k * y) for a, f, x, y in peaks]])
+        problem = tp.Problem(surface, k * given[0], k * given[-1], (0.0, 0.0, 10.0 * k, 10.0 * k))
+        settled = newton.settle(surface, k * newton.resample(given, 64))
+        return tp.refine(problem, k * given).length / k, settled / k
+
+    length, settled = found(1.0)
+    scaled_length, scaled = found(scale)
+    assert scaled_length == pytest.approx(length, rel=1e-10)
+    np.testing.assert_allclose(scaled, settled, rtol=0.0, atol=1e-10)
+
+
 # Rasters
 
 

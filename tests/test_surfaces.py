@@ -378,6 +378,18 @@ def test_functions_and_bounds_that_make_no_surface_are_refused_with_the_value(ar
     assert shown in one_line(caught)
 
 
+@pytest.mark.parametrize("constant", [0.0, 0.1, 1000.0])
+def test_a_constant_layer_leaves_the_resolution_as_it_is(constant):
+    def waves(x, y):
+        return np.sin(x) * np.cos(y)
+
+    def both(x, y):
+        return np.stack([waves(x, y), np.full_like(x, constant)])
+
+    plain, other = (tp.Surface.from_function(f, (0, 0, 10, 10), 1e-4) for f in (waves, both))
+    assert other.resolution == plain.resolution == 10.0 / 32.0
+
+
 # Expressions
 
 

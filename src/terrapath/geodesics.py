@@ -92,13 +92,23 @@ class Ray:
         return float(self.arc_length[-1])
 
     @property
-    def position(self) -> Callable[[Any], Array]:
-        """Position by arc length between the steps (cubic Hermite)."""
-        from scipy.interpolate import CubicHermiteSpline
+    def leaves_at_once(self) -> bool:
+        """Does it start on the edge and lead outwards? Its start is all there is of it then."""
+        return len(self.arc_length) == 1
 
-        curve: Callable[[Any], Array] = CubicHermiteSpline(
-            self.arc_length, self.points, self.velocities
-        )
+    @property
+    def position(self) -> Callable[..., Array]:
+        """Position by arc length between the steps (cubic Hermite).
+
+        As SciPy's curves, it gives its derivatives, too: ``position(s, 1)`` is the velocity.
+        """
+        from scipy.interpolate import CubicHermiteSpline, PPoly
+
+        curve: Callable[..., Array]
+        if self.leaves_at_once:
+            curve = PPoly(np.stack([self.velocities, self.points]), [0.0, 1.0])
+        else:
+            curve = CubicHermiteSpline(self.arc_length, self.points, self.velocities)
         return curve
 
     @property
@@ -106,6 +116,8 @@ class Ray:
         """Arc lengths at which the end is conjugate to the start: j = 0 again."""
         from scipy.interpolate import CubicHermiteSpline
 
+        if self.leaves_at_once:
+            return np.empty(0)
         curve = CubicHermiteSpline(self.arc_length, self.jacobi, self.jacobi_slope)
         roots = curve.roots(extrapolate=False)
         return np.asarray(roots[roots > 1e-9 * self.length])
@@ -256,7 +268,7 @@ def closest_approach(ray: Ray, target: Sequence[float] | Array) -> Miss:
         best = s[k] - slope / bend if bend > 0.0 else s[k]
         best = float(np.clip(best, s[k - 1], s[k + 1]))
     offset = np.asarray(target) - curve(best)
-    v = (curve(best + 1e-6 * ray.length) - curve(best - 1e-6 * ray.length)) / ray.length
+    v = curve(best, 1)
     side = v[0] * offset[1] - v[1] * offset[0]
     distance = float(np.hypot(*offset))
     return Miss(ray, float(best), distance, math.copysign(distance, side))

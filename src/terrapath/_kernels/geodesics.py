@@ -185,6 +185,10 @@ def dormand_prince():
 
 _SAFETY, _LEAST_FACTOR, _MOST_FACTOR = 0.9, 0.2, 6.0
 
+# A step this short, as a share of the way to it and of the unit of length, leads nowhere:
+# there is no curve through two rows that only rounding tells apart.
+_NOWHERE = 1e-15
+
 # How a ray ended.
 REACHED = 0
 LEFT = 1  # it left the bounds
@@ -337,7 +341,8 @@ def trace(surface, tableau, bounds, x, y, angle, length, longest_step, unit, tol
     """Follow the geodesic that leaves (x, y) at an angle over a length, or to the bounds.
 
     rows (capacity, 7) is filled with arc length, position, velocity and Jacobi field at every
-    accepted step, the ends included. Returns (rows filled, how it ended).
+    accepted step, the ends included; there is one where the ray leaves the bounds at once.
+    Returns (rows filled, how it ended).
     """
     slopes = np.empty((tableau.b.shape[0] + 1, 6))
     s = unit_state(surface, x, y, angle)
@@ -362,6 +367,8 @@ def trace(surface, tableau, bounds, x, y, angle, length, longest_step, unit, tol
         outside = share_outside(bounds, s, end, h)
         if outside >= 0.0:
             part, end = step_to_edge(surface, tableau, bounds, s, end, h, outside, slopes)
+            if not part > _NOWHERE * (done + unit):  # it is on the edge and leads outwards
+                return count, LEFT
             record(rows, count, done + part, end)
             return count + 1, LEFT
         done = length if last else done + h

@@ -109,9 +109,20 @@ def _refined(problem: Problem, given: Path, tolerance: float) -> Iterator[Array]
     yield from taut_paths(problem, given.points, tolerance)
 
 
-def _stages(surface: Surface, length: float) -> tuple[int, ...]:
+def _features(surface: Surface, given: Path) -> float:
+    """Features of the surface along a path, as many as no piece may pass over unseen.
+
+    Newton's method makes pieces equally long under h, which counts the cost, whereas features
+    are as large as they are on the plane: where the cost is least, pieces reach farthest.
+    """
+    length = given.length
+    if surface.costs:
+        length /= float(surface.cost(_along(given.points, MOST_PIECES)).min())
+    return length / surface.resolution
+
+
+def _stages(features: float) -> tuple[int, ...]:
     """Numbers of pieces, from coarse to fine."""
-    features = length / surface.resolution
     first = min(max(math.ceil(features), FEWEST_PIECES), MOST_PIECES)
     last = min(max(math.ceil(PIECES_PER_FEATURE * features), 2 * FEWEST_PIECES), MOST_PIECES)
     return tuple(round(count) for count in np.geomspace(first, last, STAGES))
@@ -129,7 +140,7 @@ def _geodesics(surface: Surface, given: Path, tolerance: float) -> list[Array]:
 
     Where the surface is too rough to be sure of that, the polyline of least energy comes first.
     """
-    stages = _stages(surface, given.length)
+    stages = _stages(_features(surface, given))
     polyline = shortest_polyline(surface, _along(given.points, stages[0]), stages)
     corrected = correct(surface, polyline)
     curve = curve_through(polyline if corrected is None else corrected)

@@ -11,7 +11,9 @@ from ..surface import Surface
 from ..validation import Array
 from .curve import spline_through
 
-STATIONARY = 1e-9  # largest derivative of the energy, as a share of it, at the path found
+# Largest derivative of the energy at the path found, times the path's length on the plane, as a
+# share of the energy: free of units.
+STATIONARY = 1e-9
 SETTLED = 1e-9  # largest move of Newton's method, as a share of a mean piece, at a minimum
 ROUNDING = 1e-15  # of the energy: whether a step saves less only rounding decides
 MOST_STEPS = 200
@@ -107,7 +109,7 @@ def _is_minimum(step: Step, path: Lifted) -> bool:
     """Is this one, to the accuracy that Newton's method is run to?"""
     if not step.definite:
         return False
-    if _largest(step.derivative) <= STATIONARY * path.energy:
+    if _largest(step.derivative) * path.planar_length <= STATIONARY * path.energy:
         return True
     saved = -0.5 * float(np.vdot(step.move, step.derivative))
     settled = SETTLED * path.planar_length / (len(path.points) - 1)

@@ -118,8 +118,11 @@ def interpolate(values: Array, x: Array, y: Array, weights: Array) -> Spline:
     return _spline_of(_padded(values), x, y, weights)
 
 
-def _resample(values: Array, x: Array, axis: int) -> tuple[Array, Array]:
-    """Bring a non-uniform axis onto a uniform one as fine as its finest step."""
+def _resample(values: Array, x: Array, axis: int, linear: bool) -> tuple[Array, Array]:
+    """Bring a non-uniform axis onto a uniform one as fine as its finest step.
+
+    Smoothly, or linearly, which stays between the samples.
+    """
     if uniform_spacing(x) is not None:
         return values, x
     count = int(np.ceil((x[-1] - x[0]) / np.diff(x).min())) + 1
@@ -128,10 +131,11 @@ def _resample(values: Array, x: Array, axis: int) -> tuple[Array, Array]:
             f"the grid's steps differ by a factor of over {MOST_RESAMPLING} "
             f"({np.diff(x).min():g} to {np.diff(x).max():g}); resample it to equal steps first"
         )
-    from scipy.interpolate import CubicSpline
+    from scipy.interpolate import CubicSpline, make_interp_spline
 
     uniform = np.linspace(x[0], x[-1], count)
-    return CubicSpline(x, values, axis=axis)(uniform), uniform
+    curve = make_interp_spline(x, values, 1, axis=axis) if linear else CubicSpline(x, values, axis)
+    return curve(uniform), uniform
 
 
 def _at_samples(spline: Spline, x: Array, y: Array) -> Array:
@@ -158,14 +162,18 @@ def _change(scale: float, before: Spline, after: Spline, x: Array, y: Array) -> 
     return change.smoothing(scale)
 
 
-def fit_grid(values: Array, x: Array, y: Array, weights: Array, scale: float) -> GridFit:
+def fit_grid(
+    values: Array, x: Array, y: Array, weights: Array, scale: float, *, linear: bool = False
+) -> GridFit:
     """The spline through values (layers, ny, nx), smoothed where the scale is above 0.
 
+    linear : where steps are not equal, its knots lie between the samples around; those of a
+    smooth curve through samples with a sharp edge would swing beyond them.
     Large maps must fit: beside the values it holds one array of their size, two where it
     smooths.
     """
-    resampled, fine_x = _resample(values, x, 2)
-    resampled, fine_y = _resample(resampled, y, 1)
+    resampled, fine_x = _resample(values, x, 2, linear)
+    resampled, fine_y = _resample(resampled, y, 1, linear)
     spline = interpolate(resampled, fine_x, fine_y, weights)
     error = _largest_error(spline, x, y, values)
     if scale == 0.0:
@@ -281,7 +289,9 @@ def fit_function(
         value_errors, gradient_error = _errors(f, gradient, spline, bounds)
         worst, spacing = float(value_errors.max()), max(spline.dx, spline.dy)
         spread = values.max(axis=(1, 2)) - values.min(axis=(1, 2))
-        if resolution is None and (value_errors <= COARSE_TOLERANCE * spread).all():
+        # Of a layer that is constant, rounding apart, there is no shape to see.
+        seen = np.maximum(COARSE_TOLERANCE * spread, SAFETY * tolerance)
+        if resolution is None and (value_errors <= seen).all():
             resolution = spacing
         if max(worst, gradient_error) <= SAFETY * tolerance:
             shape = (samples, samples)

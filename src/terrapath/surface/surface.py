@@ -196,7 +196,8 @@ class Surface:
         logs = None
         if costs:
             require_costs(array[is_cost], x, y, [layer.name for layer in costs])
-            fitted = fit_grid(np.log(array[is_cost]), x, y, weights_of(costs), scale)
+            given = np.log(array[is_cost])
+            fitted = fit_grid(given, x, y, weights_of(costs), scale, linear=True)
             logs = limited(fitted.spline)
         fit = Fit(
             f"bicubic spline through {len(x)} x {len(y)} samples",
