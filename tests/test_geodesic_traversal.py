@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import terrapath as tp
 from oracles import geodesic_by_collocation, geodesic_by_hamilton, peaks_jets
 from terrapath import scenes
 from terrapath.cli.main import run
-from terrapath.geodesics import trace_ray
+from terrapath.geodesics import is_bracket, trace_ray
 from terrapath.planners import geodesic_traversal
 
 SCENES = {
@@ -331,6 +332,25 @@ def test_from_the_edge_of_the_bounds_the_geodesics_are_those_of_wider_bounds(sta
     )
     inside = [g.length for g in wide if g.points.min() >= -1e-12 and g.points.max() <= 10.0 + 1e-12]
     assert [g.length for g in near] == pytest.approx(inside, rel=1e-11)
+
+
+@pytest.mark.parametrize("cost", [1e-3, 10.0, 1e4])
+def test_a_constant_cost_leaves_the_fan_as_it_is(cost):
+    axis = np.linspace(0.0, 10.0, 41)
+    hill = 2.0 * np.exp(-0.4 * ((axis[:, None] - 5.2) ** 2 + (axis - 5.0) ** 2))
+    one, other = (
+        tp.GeodesicTraversal(directions=30).fan(tp.Problem(surface, (1, 1), (9, 9)))
+        for surface in (
+            tp.Surface.from_grid([hill, np.full_like(hill, c)], axis, axis, kinds=["rise", "cost"])
+            for c in (1.0, cost)
+        )
+    )
+    np.testing.assert_allclose(other.closest, one.closest, rtol=0.0, atol=0.01)
+    brackets = [[is_bracket(*pair) for pair in pairwise(fan.misses)] for fan in (one, other)]
+    assert brackets[0] == brackets[1]
+    assert any(brackets[0])
+    rows = [np.array([len(ray.points) for ray in fan.rays]) for fan in (one, other)]
+    assert (rows[1] <= 4 * rows[0]).all()
 
 
 # Options

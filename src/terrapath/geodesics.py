@@ -246,6 +246,7 @@ class Miss:
     arc_length: float
     distance: float  # on the plane, map units
     side: float  # signed distance: above 0 where the target lies to the left
+    speed: float  # on the plane, of the ray there: map units a unit of arc length
 
 
 SAMPLES_PER_STEP = 8
@@ -271,7 +272,7 @@ def closest_approach(ray: Ray, target: Sequence[float] | Array) -> Miss:
     v = curve(best, 1)
     side = v[0] * offset[1] - v[1] * offset[0]
     distance = float(np.hypot(*offset))
-    return Miss(ray, float(best), distance, math.copysign(distance, side))
+    return Miss(ray, float(best), distance, math.copysign(distance, side), float(np.hypot(*v)))
 
 
 ATTEMPTS = 60
@@ -305,7 +306,7 @@ def is_bracket(low: Miss, high: Miss) -> bool:
     Where the field of rays is torn, as behind a peak that they pass on two sides, their
     closest approaches lie farther apart along the rays than across them.
     """
-    apart = abs(low.arc_length - high.arc_length)
+    apart = abs(low.arc_length - high.arc_length) * max(low.speed, high.speed)  # on the plane
     leaves = min(low.arc_length, high.arc_length) > 0.0  # some ray leads towards the target
     across = low.distance + high.distance
     return leaves and (low.side > 0.0) != (high.side > 0.0) and apart <= across

@@ -124,7 +124,8 @@ class GeodesicTraversal:
             angle,
             LONGEST_SHARE * problem.straight_length,
             bounds=problem.bounds,
-            longest_step=problem.bounds.side / STEPS_PER_SIDE,
+            # Steps are lengths under h, which counts the cost.
+            longest_step=problem.surface.typical_cost * problem.bounds.side / STEPS_PER_SIDE,
             tolerance=self.tolerance,
         )
 
