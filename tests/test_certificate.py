@@ -1287,7 +1287,8 @@ def test_foreign_files_are_told_in_one_line_and_never_run(small, tmp_path):
         archive.writestr("value.npy", b"\x93NUMPY\x01\x00not a header")
     one_line(path)
     assert not trap.exists()
-    one_line(tmp_path / "missing.npz")
+    with pytest.raises(tp.MapError, match=r"missing\.npz does not exist; check the path$"):
+        tp.Certificate.load(tmp_path / "missing.npz")
     one_line(tmp_path)
 
 
