@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ._kernels import geodesics as kernels
+from ._kernels import rays
 from .errors import InputError
 from .metric import inverse_metric_tensor, metric_tensor
 from .surface import Surface
@@ -155,9 +156,9 @@ def trace_ray(
     unit = _length_unit(surface, length)
     rows = np.empty((256, 7))
     while True:
-        count, ended = kernels.trace(
+        count, ended = rays.trace(
             surface.data,
-            kernels.dormand_prince(),
+            rays.dormand_prince(),
             edges,
             x,
             y,
@@ -168,7 +169,7 @@ def trace_ray(
             tolerance,
             rows,
         )
-        if ended != kernels.EXHAUSTED:
+        if ended != rays.EXHAUSTED:
             break
         if len(rows) >= MOST_STEPS or not np.isfinite(rows[:count]).all():
             raise InputError(
@@ -178,7 +179,7 @@ def trace_ray(
             )
         rows = np.empty((4 * len(rows), 7))
     s, points, velocities, j, dj = np.split(rows[:count].copy(), (1, 3, 5, 6), axis=1)
-    left = ended == kernels.LEFT
+    left = ended == rays.LEFT
     return Ray(float(angle), s[:, 0], points, velocities, j[:, 0], dj[:, 0], left)
 
 
