@@ -468,7 +468,7 @@ def test_the_margin_of_a_core_is_below_all_samples_of_its_edge_and_near(seed):
     core = Core(*(int(k) for k in core))
     anchor = oracles.Terrain(problem.surface).lift(np.array([problem.goal]))[0]
     shifted = anchor - np.concatenate([problem.start, np.zeros(len(anchor) - 2)])
-    margin = proofs.edge_margin(problem, made, proofs.End(core, problem.goal, shifted), factor)
+    margin = proofs.edge_margin(problem, made, proofs.End(core, problem.goal, shifted, 0.0), factor)
     x = np.linspace(lattice.x[core.column0], lattice.x[core.column1], 401)
     y = np.linspace(lattice.y[core.row0], lattice.y[core.row1], 401)
     edge = np.concatenate(

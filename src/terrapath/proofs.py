@@ -241,6 +241,7 @@ class End(NamedTuple):
     core: Core
     place: tuple[float, float]  # on the map
     lifted: Array  # (2 + layers,), the start being the origin of the plane
+    doubt: float  # what rounding may add to a chord from it, map units
 
 
 def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
@@ -276,10 +277,9 @@ def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> floa
 
     The distance is bounded by the chord and the least cost around.
     """
-    surface, core = _ground(problem).surface, end.core
-    anchor = _anchor(problem, claim, end)
+    core, anchor = end.core, _anchor(problem, claim, end)
     margin = kernels.margin_of_core(
-        surface,
+        _ground(problem).surface,
         _bound(problem, claim),
         anchor,
         float(factor),
@@ -289,7 +289,7 @@ def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> floa
         core.row1,
         _cutting(problem, claim.lattice),
     )
-    return float(margin) - anchor.floor * _doubt(surface)
+    return float(margin) - anchor.floor * end.doubt
 
 
 def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
@@ -306,9 +306,10 @@ def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
     if _overlap(claim.start_core, claim.goal_core):
         return straight
     detour = least * least_detour(problem, claim.bounds) * (1.0 - ROUNDING)
-    ends = End(claim.start_core, problem.start, start), End(claim.goal_core, problem.goal, goal)
-    first = edge_margin(problem, claim, ends[0], -1.0 / norm)
-    last = edge_margin(problem, claim, ends[1], 1.0 / norm)
+    begin = End(claim.start_core, problem.start, start, doubt)
+    end = End(claim.goal_core, problem.goal, goal, doubt)
+    first = edge_margin(problem, claim, begin, -1.0 / norm)
+    last = edge_margin(problem, claim, end, 1.0 / norm)
     rest = min(last, claim.horizon / norm - least * doubt)
     within = first + rest - ROUNDING * (abs(first) + abs(rest))
     # No number, where something overflowed.

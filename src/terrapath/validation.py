@@ -39,8 +39,8 @@ class Bounds(NamedTuple):
 
     def widened(self, margin: float) -> Bounds:
         """With so much more on every side, map units."""
-        low, high = (self.x1_min - margin, self.x2_min - margin), self[2:]
-        return Bounds(*low, high[0] + margin, high[1] + margin)
+        low, high = (self.x1_min - margin, self.x2_min - margin), (self.x1_max, self.x2_max)
+        return Bounds(*low, *(edge + margin for edge in high))
 
     def contains(self, points: Array) -> npt.NDArray[np.bool_]:
         """Points (..., 2) -> (...) bool."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
+from .records import record
 from .tree import COST, TENSOR, X, Y, chord_between, edge_length, survey
 
 # Places in Graph.counters.
@@ -31,20 +32,15 @@ WITHOUT_WAY = -2
 
 # A vertex: the way to it, its slot of the heap, and the metric tensor. That comes last: to
 # Numba, a tensor with more behind it would be a tensor.
-VERTEX = np.dtype(
-    (
-        np.record,
-        [
-            ("parent", np.int32),  # -1 at the start
-            ("slot", np.int32),
-            *TENSOR.descr,
-        ],
-    )
+VERTEX = record(
+    ("parent", np.int32),  # -1 at the start
+    ("slot", np.int32),
+    *TENSOR.descr,
 )
 
 
 # A slot of the heap.
-ENTRY = np.dtype((np.record, [("key", np.float64), ("vertex", np.int32)]))
+ENTRY = record(("key", np.float64), ("vertex", np.int32))
 
 
 class Nodes(NamedTuple):

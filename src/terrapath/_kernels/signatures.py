@@ -37,9 +37,7 @@ class Typing(Context):
 class _Remembered(types.Function):
     """One of Numba's own functions, which looks into the memory for its signatures."""
 
-    def __init__(self, function: types.Function) -> None:
-        self.__dict__ = dict(function.__dict__)
-        self._function = function
+    _function: types.Function
 
     def get_call_type(self, context: Typing, args: tuple[types.Type, ...], kws: Any) -> Any:
         return context.resolve_function_type(self._function, args, kws)
@@ -48,7 +46,7 @@ class _Remembered(types.Function):
 @cache
 def _remembered(function: types.Function) -> types.Function:
     known = object.__new__(_Remembered)  # a type called is interned, and would be numbered anew
-    known.__init__(function)
+    known.__dict__ |= {**function.__dict__, "_function": function}
     return known
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from .compiler import inner_kernel, kernel
 from .free_space import segment_is_free
 from .metric_rows import H11, H12, H22, fill_row
+from .records import record
 from .selling import Superbase, obtuse_superbase, products
 from .surfaces import Metric
 
@@ -26,23 +27,18 @@ ALL_LINKS = (1 << 12) - 1
 WINDOW = 1 << 12
 
 # The stencil of a node.
-NODE = np.dtype(
-    (
-        np.record,
-        [
-            ("x0", np.int16),  # e_0 and e_1, in nodes; e_2 = -e_0 - e_1
-            ("y0", np.int16),
-            ("x1", np.int16),
-            ("y1", np.int16),
-            ("rho0", np.float32),
-            ("rho1", np.float32),
-            ("rho2", np.float32),
-            ("links", np.uint16),
-            ("around", np.uint16),  # bit k: the k-th node around may be reached along an edge
-            ("after", np.int32),  # the next node of the same bucket, -1 where none
-            ("before", np.int32),  # the one before; -2 - bucket at the head of a bucket's list
-        ],
-    )
+NODE = record(
+    ("x0", np.int16),  # e_0 and e_1, in nodes; e_2 = -e_0 - e_1
+    ("y0", np.int16),
+    ("x1", np.int16),
+    ("y1", np.int16),
+    ("rho0", np.float32),
+    ("rho1", np.float32),
+    ("rho2", np.float32),
+    ("links", np.uint16),
+    ("around", np.uint16),  # bit k: the k-th node around may be reached along an edge
+    ("after", np.int32),  # the next node of the same bucket, -1 where none
+    ("before", np.int32),  # the one before; -2 - bucket at the head of a bucket's list
 )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from .buckets import Buckets
 from .compiler import inner_kernel, kernel
 from .lengths import composite_boole, norm
+from .records import record
 from .surfaces import Metric, plus_layer, slope_at, spot_at, times_cost
 
 # Places in Tree.counters.
@@ -30,35 +31,25 @@ COST = 2  # length from the start
 LIFTED = 3  # the first of the weighted layer values
 
 # The metric tensor at a vertex: what is read of it where an edge is measured.
-TENSOR = np.dtype((np.record, [(name, np.float64) for name in ("h11", "h12", "h22")]))
+TENSOR = record(*((name, np.float64) for name in ("h11", "h12", "h22")))
 
 # How a vertex hangs in the tree. Costs are passed on over many, so they lie close together.
-LINK = np.dtype(
-    (
-        np.record,
-        [
-            ("edge", np.float64),  # length of the edge from the parent
-            ("parent", np.int32),  # -1 at the start
-            ("child", np.int32),  # first child, -1 where none
-            ("sibling", np.int32),  # next child of the same parent
-            ("age", np.int32),  # how many vertices there were before it
-        ],
-    )
+LINK = record(
+    ("edge", np.float64),  # length of the edge from the parent
+    ("parent", np.int32),  # -1 at the start
+    ("child", np.int32),  # first child, -1 where none
+    ("sibling", np.int32),  # next child of the same parent
+    ("age", np.int32),  # how many vertices there were before it
 )
 
 # A candidate edge between the newest vertex and one near it.
-CANDIDATE = np.dtype(
-    (
-        np.record,
-        [
-            ("squared", np.float64),  # planar distance squared
-            ("chord", np.float64),
-            ("cost", np.float64),  # of the other vertex, before this extension
-            ("length", np.float64),  # negative where not yet measured
-            ("vertex", np.int32),
-            ("free", np.int32),  # 1 free, 0 blocked, -1 not yet tested
-        ],
-    )
+CANDIDATE = record(
+    ("squared", np.float64),  # planar distance squared
+    ("chord", np.float64),
+    ("cost", np.float64),  # of the other vertex, before this extension
+    ("length", np.float64),  # negative where not yet measured
+    ("vertex", np.int32),
+    ("free", np.int32),  # 1 free, 0 blocked, -1 not yet tested
 )
 
 

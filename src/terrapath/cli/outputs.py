@@ -26,18 +26,24 @@ def require_outputs(paths: Sequence[Path], inputs: Iterable[str]) -> None:
     if len(places) < len(paths):
         raise MapError("the same file is named twice among the outputs; name each once")
     for name in inputs:
-        for read in map(_place, _files_in(name)):
-            for place in (read, *read.parents):  # an output may be a folder
-                if place in places:
-                    raise MapError(
-                        f"output={str(places[place])!r} would replace the input {name!r}; name "
-                        "another file"
-                    )
+        lost = places.keys() & set(_places_of(name))
+        if lost:
+            raise MapError(
+                f"output={str(places[min(lost)])!r} would replace the input {name!r}; name "
+                "another file"
+            )
 
 
 def _place(path: Path) -> Path:
     """Where a path leads. Path.resolve would raise where links go in circles."""
     return Path(os.path.realpath(path))
+
+
+def _places_of(name: str) -> Iterator[Path]:
+    """Where an input may lie, and the folders around it: an output may be a folder."""
+    for file in _files_in(name):
+        place = _place(file)
+        yield from (place, *place.parents)
 
 
 def _files_in(name: str) -> Iterator[Path]:

@@ -68,37 +68,35 @@ class View:
         """The same part with cells ``factor`` times as large a side."""
         return replace(self, factor=factor)
 
-    def around(self, x: Array, y: Array, reach: tuple[int, int] = (0, 0)) -> View | None:
-        """The part that holds points in the band's own coordinates; None where there is none.
-
-        reach : rows and columns more around them.
-        """
-        grid = self.band.grid
-        column, row = grid.cells(x, y)
+    def around(self, x: Array, y: Array) -> View | None:
+        """The part that holds points in the band's own coordinates; None where there is none."""
+        column, row = self.band.grid.cells(x, y)
         kept = []
-        for found, count, more in (
-            (row, grid.rows, reach[0]),
-            (column, grid.columns, reach[1]),
-        ):
-            margin = MARGIN * self.factor + more
-            first = max(0, math.floor(found.min() - margin))
-            last = min(count, math.ceil(found.max() + margin) + 1)
+        for found, count in ((row, self.band.grid.rows), (column, self.band.grid.columns)):
+            first = max(0, math.floor(found.min() - MARGIN * self.factor))
+            last = min(count, math.ceil(found.max() + MARGIN * self.factor) + 1)
             if first >= last or found.max() < -0.5 or found.min() > count - 0.5:
                 return None
             kept.append(slice(first, last))
         return replace(self, rows=kept[0], columns=kept[1])
 
-    def within(self, bounds: Bounds, margin: float = 0.0) -> View:
-        """The part inside a rectangle of the map's own coordinates, and a few cells more.
+    def widened(self, margin: float) -> View:
+        """With so much more on every side, in the unit of the plane that the map is planned on."""
+        grid = self.band.grid
+        rows, columns = grid.window(self.rows, self.columns).reach(margin)
+        return replace(
+            self,
+            rows=slice(max(self.rows.start - rows, 0), min(self.rows.stop + rows, grid.rows)),
+            columns=slice(
+                max(self.columns.start - columns, 0), min(self.columns.stop + columns, grid.columns)
+            ),
+        )
 
-        margin : more around it, in the unit of the plane that the map is planned on.
-        """
+    def within(self, bounds: Bounds) -> View:
+        """The part inside a rectangle of the map's own coordinates, and a few cells more."""
         x = np.array([bounds.x1_min, bounds.x1_max] * 2)
         y = np.repeat([bounds.x2_min, bounds.x2_max], 2)
         found = self.around(x, y)
-        if found is not None and margin > 0.0:
-            grid = self.band.grid.window(found.rows, found.columns)
-            found = self.around(x, y, grid.reach(margin))
         if found is None:
             extent = ", ".join(f"{value:.10g}" for value in self.band.grid.extent())
             raise MapError(

@@ -206,7 +206,8 @@ def _base_view(band: Band, within: Any, margin: float, decimate: int, most_cells
     """What is read of the heights; refused where it is too large, before it is read."""
     view = View.whole(band).coarser(decimate)
     if within is not None:
-        view = view.within(as_bounds(within, "within"), margin)
+        view = view.within(as_bounds(within, "within"))
+        view = view.widened(margin) if margin > 0.0 else view
     view.require_size(most_cells)
     return view
 
