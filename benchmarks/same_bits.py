@@ -1,7 +1,7 @@
 """Digests of what the planners answer, to see whether a change altered a bit of any of it.
 
-    python benchmarks/same_bits.py --store     # before the change
-    python benchmarks/same_bits.py             # after it: names what differs, exit code 1
+    python -m benchmarks.same_bits --store     # before the change
+    python -m benchmarks.same_bits             # after it: names what differs, exit code 1
 
 The problems are the six scenes of the paper, the Jacksboro fault and ten random ones with
 obstacles. Bits belong to a machine and its libraries, so ``same_bits.json`` names both: where
@@ -50,7 +50,7 @@ def random_problem(seed: int) -> tp.Problem:
         surface = tp.Surface.from_peaks(peaks.tolist())
     x, y = rng.uniform(3.0, 6.0, 2)
     box = shapely.box(x, y, x + rng.uniform(0.5, 1.5), y + rng.uniform(0.5, 1.5))
-    disc = tp.Circle(*rng.uniform(2.5, 7.5, 2), rng.uniform(0.3, 0.8))
+    disc = tp.Circle(rng.uniform(2.5, 7.5), rng.uniform(2.5, 7.5), rng.uniform(0.3, 0.8))
     blocked = np.zeros((21, 21), bool)
     blocked[tuple(rng.integers(5, 15, (2, 6)))] = True
     obstacles = [box, disc, tp.Mask(blocked, axis, axis)]
@@ -87,7 +87,8 @@ def field(problem: tp.Problem) -> str:
     """The distance field, and a path through it."""
     surface, bounds = problem.surface, problem.bounds
     made = tp.distance_field(surface, problem.start, bounds=bounds, spacing=bounds.side / 120)
-    return digest(made.values, made.path_to(problem.goal).points)
+    path = made.path_to(problem.goal)
+    return digest(made.values, *([] if path is None else [path.points]))
 
 
 MEASURES: dict[str, Callable[[tp.Problem], str]] = {
@@ -128,7 +129,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--store", action="store_true", help="keep the digests of this code")
     store = parser.parse_args().store
-    found = {}
+    found: dict[str, str] = {}
     for name, problem in problems():
         found.update(measured(name, problem))
         print(name, file=sys.stderr)

@@ -8,31 +8,18 @@ import sys
 import numpy as np
 import pytest
 
-from terrapath import memory, scenes
+from benchmarks import bound, figures, fresh, large_maps, marching, paths, startup
+from benchmarks import report as reports
+from benchmarks import run as runs
+from benchmarks.peers import SCIKIT_FMM, Peer
+from benchmarks.settings import SCENES, Scale, true_length
+from benchmarks.timing import Reading, Stopwatch, Target, Timing, percent
+from terrapath._support import memory
 from terrapath.cli.main import run
 from terrapath.errors import TerrapathError
-from terrapath.experiments.benchmarks import (
-    bound,
-    figures,
-    fresh,
-    large_maps,
-    marching,
-    paths,
-    startup,
-)
-from terrapath.experiments.benchmarks import report as reports
-from terrapath.experiments.benchmarks import run as runs
-from terrapath.experiments.benchmarks.peers import SCIKIT_FMM, Peer
-from terrapath.experiments.benchmarks.settings import SCENES, Scale, true_length
-from terrapath.experiments.benchmarks.timing import (
-    Reading,
-    Stopwatch,
-    Target,
-    Timing,
-    percent,
-)
-from terrapath.experiments.runner import Runner
-from terrapath.experiments.trials import Store, rebuilt
+from terrapath.paper.runner import Runner
+from terrapath.paper.trials import Store, rebuilt
+from terrapath.problem import scenes
 
 TINY = Scale(
     scenes=("one-peak",),

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from oracles import nearest_by_force, within_by_force
-from terrapath._kernels import buckets as kernels
-from terrapath._kernels.tree import CANDIDATE
+from terrapath._kernels.planners import buckets as kernels
+from terrapath._kernels.planners.tree import CANDIDATE
 
 X0, Y0, WIDTH, HEIGHT = -3.0, 2.0, 8.0, 4.0
 

@@ -23,14 +23,15 @@ import planner_oracles
 import terrapath as tp
 from oracles import great_circle
 from processes import in_another_process
-from terrapath import certificate, proofs, scenes
-from terrapath._kernels import certificate as kernels
-from terrapath._kernels import surface_models, taylor
-from terrapath.bounding import Search, search_window
-from terrapath.certificate import fingerprint, seal_of
-from terrapath.geodesics import trace_ray
-from terrapath.lattice import Lattice
-from terrapath.proofs import Core
+from terrapath._kernels.certificates import norms as kernels
+from terrapath._kernels.certificates import surface_models, taylor
+from terrapath.certificates import certificate, claims
+from terrapath.certificates.certificate import fingerprint, seal_of
+from terrapath.certificates.claims import Core
+from terrapath.certificates.search import Search, search_window
+from terrapath.geodesics.rays import trace_ray
+from terrapath.problem import scenes
+from terrapath.space.lattice import Lattice
 from test_optimality import FLAT, LAYOUTS, REGION
 from test_random_problems import star
 
@@ -444,11 +445,11 @@ def test_what_a_cell_needs_covers_all_samples_of_it(seed):
     problem = random_problem(random, on_spline=seed % 2 == 0)
     made = certified(problem, int(random.integers(6, 14)))
     steepest, needed = sample_cells(problem, made)
-    needs = proofs.cell_needs(problem, made, 0.0)
-    exempt = proofs.exempt_cells(problem, made)
+    needs = claims.cell_needs(problem, made, 0.0)
+    exempt = claims.exempt_cells(problem, made)
     assert (needs.proven[exempt] == 0.0).all()
     assert (needs.proven[~exempt] >= needed[~exempt] * (1.0 - 1e-12)).all()
-    norm = proofs.proven_norm(problem, made, needs.proven)
+    norm = claims.proven_norm(problem, made, needs.proven)
     assert norm >= needed[~exempt].max(initial=0.0) * (1.0 - 1e-12)
     # Where the norm alone settles it, cutting cells up loses nothing.
     assert norm <= 1.05 * max(steepest[~exempt].max(), needs.likely.max())
@@ -468,7 +469,7 @@ def test_the_margin_of_a_core_is_below_all_samples_of_its_edge_and_near(seed):
     core = Core(*(int(k) for k in core))
     anchor = oracles.Terrain(problem.surface).lift(np.array([problem.goal]))[0]
     shifted = anchor - np.concatenate([problem.start, np.zeros(len(anchor) - 2)])
-    margin = proofs.edge_margin(problem, made, proofs.End(core, problem.goal, shifted, 0.0), factor)
+    margin = claims.edge_margin(problem, made, claims.End(core, problem.goal, shifted, 0.0), factor)
     x = np.linspace(lattice.x[core.column0], lattice.x[core.column1], 401)
     y = np.linspace(lattice.y[core.row0], lattice.y[core.row1], 401)
     edge = np.concatenate(
@@ -934,7 +935,7 @@ def test_rounded_layers_count_as_much_as_the_ground_around_costs():
             start_core=Core(8, 12, centre - 2, centre + 2),
             goal_core=Core(48, 52, centre - 2, centre + 2),
         )
-        proven = proofs.proven_value(problem, forgery, forgery.norm)
+        proven = claims.proven_value(problem, forgery, forgery.norm)
         assert proven <= problem.path([start, goal]).length
 
 
@@ -990,10 +991,10 @@ def test_a_lower_horizon_needs_less_of_every_cell_and_proves_less():
     problem = hills()
     made = certified(problem, 40, 17.0)
     low = resealed(made, horizon=made.horizon - 1.0)
-    before, after = (proofs.cell_needs(problem, c, 0.0).proven for c in (made, low))
+    before, after = (claims.cell_needs(problem, c, 0.0).proven for c in (made, low))
     assert (after <= before * (1.0 + 1e-12)).all()
     assert (after < before).any()
-    assert proofs.proven_value(problem, low, low.norm) < made.value - 0.5
+    assert claims.proven_value(problem, low, low.norm) < made.value - 0.5
     with pytest.raises(tp.CertificateError, match="no more than"):
         resealed(low, value=made.value).check(problem)
 
@@ -1119,7 +1120,7 @@ def test_a_random_function_proves_only_what_is_true(seed):
     for size in (1e-3, 1e-2, 0.1, 1.0):
         rough = made.coefficients + size * random.normal(size=made.coefficients.shape)
         proposal = replace(made, coefficients=rough)
-        needs = proofs.cell_needs(problem, proposal, 0.0)
+        needs = claims.cell_needs(problem, proposal, 0.0)
         found = certificate.certify(problem, proposal, needs)
         assert found.check(problem) == found.value <= truth
         values.append(found.value)
@@ -1147,7 +1148,7 @@ def imports_of(module):
 
 def test_the_checker_shares_nothing_with_the_solver():
     assert imports_of(certificate) == {"errors", "files", "problem", "proofs", "validation"}
-    assert imports_of(proofs) == {
+    assert imports_of(claims) == {
         "_kernels.certificate",
         "_kernels.surfaces",
         "errors",

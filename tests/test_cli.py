@@ -16,7 +16,7 @@ from rasterio.transform import from_origin
 
 import terrapath as tp
 from terrapath.cli.main import run
-from terrapath.planners import PLANNERS, finishing
+from terrapath.planners import PLANNERS, finished
 
 FAST = ["--samples", "300"]
 # What the planner found, and nothing more.
@@ -485,8 +485,8 @@ def test_the_goal_may_lie_on_the_edge_of_the_bounds(planner, capsys):
 
 
 def test_a_planner_without_a_path_gets_no_bound(capsys, monkeypatch):
-    monkeypatch.setattr(finishing, "lower_bound", None)
-    monkeypatch.setattr(finishing, "refine", None)
+    monkeypatch.setattr(finished, "lower_bound", None)
+    monkeypatch.setattr(finished, "refine", None)
     code, answer = json_of(capsys, "six-peaks", "--samples", "20", "--step", "0.1")
     assert code == 3
     assert answer["lower_bound"] is None
@@ -497,7 +497,7 @@ def test_ctrl_c_while_a_path_is_finished_loses_nothing(stage, tmp_path, capsys, 
     def interrupt(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(finishing, stage, interrupt)
+    monkeypatch.setattr(finished, stage, interrupt)
     files = [tmp_path / "a.json", tmp_path / "a.geojson"]
     asked = ["six-peaks", *FAST, "--certificate", str(tmp_path / "a.npz"), "--json"]
     for file in files:
@@ -518,8 +518,8 @@ def test_a_failure_while_a_path_is_finished_loses_nothing(capsys, monkeypatch):
     def fail(*_, **__):
         raise ArithmeticError("by zero")
 
-    monkeypatch.setattr(finishing, "refine", fail)
-    monkeypatch.setattr(finishing, "lower_bound", fail)
+    monkeypatch.setattr(finished, "refine", fail)
+    monkeypatch.setattr(finished, "lower_bound", fail)
     assert run(["plan", "six-peaks", *FAST, "--json"]) == 0
     captured = capsys.readouterr()
     answer = json.loads(captured.out)

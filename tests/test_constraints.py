@@ -15,8 +15,8 @@ from scipy import ndimage
 
 import terrapath as tp
 from oracles import boxes_of_mask
-from terrapath.clearance import inflated
-from terrapath.steepness import Steepness
+from terrapath.space.constraints import inflated
+from terrapath.space.slope_limit import Steepness
 from terrapath.validation import Bounds
 
 SIDE = 10.0
@@ -461,7 +461,7 @@ def test_a_problem_that_is_half_made_can_be_shown():
 
 
 def test_certificates_tell_problems_of_other_constraints_apart():
-    from terrapath.certificate import fingerprint
+    from terrapath.certificates.certificate import fingerprint
 
     def make(**options):
         wall = shapely.box(4, 2, 5, 9)

@@ -9,12 +9,11 @@ import shapely
 from affine import Affine
 
 import terrapath as tp
-from terrapath import corridor
 from terrapath.cli.main import run
-from terrapath.corridor import Corridor, Part, factor, plan_in_corridor
 from terrapath.errors import InputError
 from terrapath.io.maps import count_cells
-from terrapath.planners import make_finished
+from terrapath.planners import corridor, make_finished
+from terrapath.planners.corridor import Corridor, Part, factor, plan_in_corridor
 
 COUNT, CELL = 300, 10.0
 START, GOAL = (400.0, 500.0), (2600.0, 2400.0)

@@ -12,16 +12,17 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
 import terrapath as tp
-from terrapath import metric, refinement
+from terrapath.distance.source import near_distance
 from terrapath.errors import CertificateError, InputError
-from terrapath.geodesics import (
+from terrapath.geodesics import refinement
+from terrapath.geodesics.rays import (
     christoffel_symbols,
     gaussian_curvature,
     geodesic_acceleration,
     trace_ray,
 )
 from terrapath.problem import Path
-from terrapath.source_model import near_distance
+from terrapath.surface import metric
 
 SIDE = 4.0
 

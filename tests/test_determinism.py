@@ -13,9 +13,9 @@ import shapely
 import terrapath as tp
 from planner_oracles import TREE_PLANNERS
 from processes import in_another_process
-from terrapath import scenes
 from terrapath._kernels import compiler
 from terrapath.planners import tree_search
+from terrapath.problem import scenes
 
 KERNELS = Path(compiler.__file__).parent
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import terrapath as tp
 from planner_oracles import visibility_length
-from terrapath import scenes
-from terrapath.eikonal import Medium
-from terrapath.source_model import model_source
+from terrapath.distance.field import Medium
+from terrapath.distance.source import model_source
+from terrapath.problem import scenes
 from terrapath.validation import Bounds
 
 FLAT = tp.Surface.from_peaks([np.empty((0, 4))])

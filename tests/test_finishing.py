@@ -13,7 +13,7 @@ from terrapath.planners import (
     Finished,
     UnfinishedWarning,
     finish,
-    finishing,
+    finished,
     make_finished,
     optimal,
 )
@@ -79,8 +79,8 @@ def test_finishing_adds_to_a_solution_and_changes_nothing_else(raw):
 
 def test_what_is_done_is_not_done_again(raw, monkeypatch):
     finished = finish(raw, refine=True, bound=True)
-    monkeypatch.setattr(finishing, "refine", None)
-    monkeypatch.setattr(finishing, "lower_bound", None)
+    monkeypatch.setattr(finished, "refine", None)
+    monkeypatch.setattr(finished, "lower_bound", None)
     assert finish(finished, refine=True, bound=True, target_gap=finished.gap) is finished
 
 
@@ -127,7 +127,7 @@ def test_a_time_limit_holds_for_the_bound_too(problem):
 
 @pytest.mark.parametrize("stage", ["refine", "lower_bound"])
 def test_ctrl_c_keeps_what_was_there(stage, raw, monkeypatch):
-    monkeypatch.setattr(finishing, stage, interrupt)
+    monkeypatch.setattr(finished, stage, interrupt)
     solution = finish(raw, refine=True, bound=True)
     assert solution.status is tp.Status.INTERRUPTED
     assert solution.stopped_by == "interrupt"
@@ -142,7 +142,7 @@ def test_ctrl_c_keeps_the_bound_so_far(raw, monkeypatch):
         watch(known)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(finishing, "lower_bound", interrupted)
+    monkeypatch.setattr(finished, "lower_bound", interrupted)
     solution = finish(raw, target_gap=1e-9)
     assert solution.status is tp.Status.INTERRUPTED
     assert solution.certificate is known
@@ -151,15 +151,15 @@ def test_ctrl_c_keeps_the_bound_so_far(raw, monkeypatch):
 
 
 def test_an_interrupted_answer_is_left_as_it_is(raw, monkeypatch):
-    monkeypatch.setattr(finishing, "refine", None)
-    monkeypatch.setattr(finishing, "lower_bound", None)
+    monkeypatch.setattr(finished, "refine", None)
+    monkeypatch.setattr(finished, "lower_bound", None)
     stopped = dataclasses.replace(raw, status=tp.Status.INTERRUPTED)
     assert finish(stopped, refine=True, bound=True) is stopped
 
 
 @pytest.mark.parametrize("stage", ["refine", "lower_bound"])
 def test_a_failure_keeps_what_was_there_and_warns(stage, raw, monkeypatch):
-    monkeypatch.setattr(finishing, stage, fail)
+    monkeypatch.setattr(finished, stage, fail)
     with pytest.warns(UnfinishedWarning, match="ArithmeticError: by zero"):
         solution = finish(raw, refine=True, bound=True)
     assert solution.status is tp.Status.SOLVED
@@ -224,7 +224,7 @@ def test_ctrl_c_while_optimal_looks_for_routes(stage, problem, monkeypatch):
 
 
 def test_ctrl_c_while_optimal_proves_keeps_the_routes(problem, monkeypatch):
-    monkeypatch.setattr(finishing, "lower_bound", interrupt)
+    monkeypatch.setattr(finished, "lower_bound", interrupt)
     solution = tp.Optimal().solve(problem)
     assert solution.status is tp.Status.INTERRUPTED
     assert solution.stopped_by == "interrupt"

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terrapath._kernels.compiler import kernel
-from terrapath._kernels.four import exp, four, four_in_row, fused, sqrt, total
+from terrapath._kernels.vec4 import exp, four, four_in_row, fused, sqrt, total
 
 numbers = st.floats(-1e6, 1e6)
 fours = st.tuples(numbers, numbers, numbers, numbers)

@@ -15,7 +15,7 @@ from oracles import (
     mask_is_free_by_shapely,
     segment_is_free_by_shapely,
 )
-from terrapath.free_space import index_grid
+from terrapath.space.free_space import index_grid
 from terrapath.validation import Bounds
 
 BOUNDS = Bounds(-1.0, -1.0, 11.0, 11.0)

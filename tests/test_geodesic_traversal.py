@@ -13,10 +13,10 @@ import shapely
 
 import terrapath as tp
 from oracles import geodesic_by_collocation, geodesic_by_hamilton, peaks_jets
-from terrapath import scenes
 from terrapath.cli.main import run
-from terrapath.geodesics import is_bracket, trace_ray
+from terrapath.geodesics.rays import is_bracket, trace_ray
 from terrapath.planners import geodesic_traversal
+from terrapath.problem import scenes
 
 SCENES = {
     "one-peak": [scenes.ONE_PEAK],

@@ -27,8 +27,8 @@ from oracles import (
     planar_speed,
 )
 from processes import in_another_process
-from terrapath import geodesics, metric, scenes
-from terrapath.geodesics import (
+from terrapath.geodesics import rays
+from terrapath.geodesics.rays import (
     christoffel_symbols,
     closest_approach,
     exponential_map,
@@ -36,6 +36,8 @@ from terrapath.geodesics import (
     geodesic_acceleration,
     trace_ray,
 )
+from terrapath.problem import scenes
+from terrapath.surface import metric
 from terrapath.validation import Bounds
 
 REGION = Bounds(*scenes.REGION)
@@ -762,4 +764,4 @@ def test_plain_python_agrees_with_the_compiled_kernels():
 
 def test_what_is_public_is_exported():
     for name in ("christoffel_symbols", "exponential_map", "gaussian_curvature", "trace_ray"):
-        assert callable(getattr(geodesics, name))
+        assert callable(getattr(rays, name))

@@ -15,11 +15,11 @@ import shapely
 
 import planner_oracles as oracles
 import terrapath as tp
-from terrapath import scenes
-from terrapath._kernels import grid_search as kernels
-from terrapath.lattice import Lattice
+from terrapath._kernels.planners import grid_search as kernels
 from terrapath.planners import grid_search, make_planner
 from terrapath.planners.tree_search import FEATURES_PER_PANEL
+from terrapath.problem import scenes
+from terrapath.space.lattice import Lattice
 
 NAMES = ("dijkstra", "a-star")
 EVERY = pytest.mark.parametrize("name", NAMES)

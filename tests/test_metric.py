@@ -18,7 +18,7 @@ from oracles import (
     peaks_gradients,
 )
 from oracles import line_r as line_r_by_algorithm_1
-from terrapath import metric
+from terrapath.surface import metric
 
 BOUNDS = (-1.0, -1.0, 11.0, 11.0)
 

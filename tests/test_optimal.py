@@ -7,8 +7,9 @@ import pytest
 import shapely
 
 import terrapath as tp
-from terrapath import distinct_routes, scenes
+from terrapath.geodesics import alternatives
 from terrapath.planners import UnfinishedWarning
+from terrapath.problem import scenes
 
 START, GOAL, REGION = (0.0, 0.0), (10.0, 10.0), (-1.0, -1.0, 11.0, 11.0)
 PAPER = [name for name in scenes.names() if name != "jacksboro"]
@@ -112,7 +113,7 @@ def raising(monkeypatch):
     """Makes the refinement of these candidates, counted from 1, raise an error."""
 
     def patch(error, *candidates):
-        refine, calls = distinct_routes.refine, []
+        refine, calls = alternatives.refine, []
 
         def refine_or_raise(problem, path):
             calls.append(path)
@@ -120,7 +121,7 @@ def raising(monkeypatch):
                 raise error
             return refine(problem, path)
 
-        monkeypatch.setattr(distinct_routes, "refine", refine_or_raise)
+        monkeypatch.setattr(alternatives, "refine", refine_or_raise)
 
     return patch
 

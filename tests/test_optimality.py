@@ -12,7 +12,7 @@ import shapely
 import planner_oracles as oracles
 import terrapath as tp
 from oracles import great_circle
-from terrapath import scenes
+from terrapath.problem import scenes
 
 # The paper's scenes
 

@@ -11,7 +11,7 @@ import shapely
 from pyproj import CRS, Transformer
 
 import terrapath as tp
-from terrapath.files import require_writable, written_whole
+from terrapath._support.files import require_writable, written_whole
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrapath import Circle, Problem, Surface, metric, scenes
-from terrapath.errors import InputError, TerrapathError
-from terrapath.experiments.benchmarks import (
+from benchmarks import (
     contenders,
     curves,
     edges,
@@ -26,13 +24,17 @@ from terrapath.experiments.benchmarks import (
     programs,
     trees,
 )
-from terrapath.experiments.benchmarks import run as runs
-from terrapath.experiments.benchmarks.exchange import discs_of, panel_of, write_problem
-from terrapath.experiments.benchmarks.peers import OMPL_PYTHON, Peer
-from terrapath.experiments.benchmarks.settings import Scale
-from terrapath.experiments.benchmarks.timing import Target, Timing
-from terrapath.experiments.runner import Runner
-from terrapath.experiments.trials import Store
+from benchmarks import run as runs
+from benchmarks.exchange import discs_of, panel_of, write_problem
+from benchmarks.peers import OMPL_PYTHON, Peer
+from benchmarks.settings import Scale
+from benchmarks.timing import Target, Timing
+from terrapath import Circle, Problem, Surface
+from terrapath.errors import InputError, TerrapathError
+from terrapath.paper.runner import Runner
+from terrapath.paper.trials import Store
+from terrapath.problem import scenes
+from terrapath.surface import metric
 
 TINY = Scale(
     tree_scenes=("six-peaks",),
@@ -362,7 +364,7 @@ def test_a_program_that_does_not_compile_is_left_out(tmp_path, monkeypatch):
 
 def test_a_program_needs_its_library(monkeypatch):
     # The sources are the repository's, wherever the package is installed.
-    monkeypatch.setattr(programs, "SOURCES", Path(__file__).parents[1] / "benchmarks")
+    monkeypatch.setattr(programs, "SOURCES", Path(__file__).parents[1] / "benchmarks" / "cpp")
     library = programs.Library("Nothing", ("no/such/header.h",), "NONE", ())
     program = programs.Program("Planners", "planners.cpp", library, "libnothing-dev")
     assert library.found_version is None

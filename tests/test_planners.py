@@ -15,8 +15,8 @@ import shapely
 
 import terrapath as tp
 from planner_oracles import TREE_PLANNERS
-from terrapath import scenes
 from terrapath.planners import PLANNERS, Progress, make_planner, tree_search
+from terrapath.problem import scenes
 
 EVERY_PLANNER = pytest.mark.parametrize("name", TREE_PLANNERS)
 ROOM = shapely.box(8.0, 8.0, 10.9, 10.9) - shapely.box(9.0, 9.0, 10.5, 10.5)

@@ -21,10 +21,11 @@ from oracles import (
     peaks_jets,
     segment_is_free_by_shapely,
 )
-from terrapath import metric, scenes
-from terrapath._kernels import contacts
-from terrapath.refinement import newton
-from terrapath.refinement.curve import spline_through
+from terrapath._kernels.geodesics import contacts
+from terrapath.geodesics.refinement import newton
+from terrapath.geodesics.refinement.curve import spline_through
+from terrapath.problem import scenes
+from terrapath.surface import metric
 
 FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
 REGION = (-1.0, -1.0, 11.0, 11.0)

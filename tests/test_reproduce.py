@@ -10,11 +10,11 @@ import sys
 import numpy as np
 import pytest
 
-from terrapath import RRTStar, scenes
+from terrapath import RRTStar
 from terrapath.cli.main import run
 from terrapath.errors import InputError
-from terrapath.experiments import figures, paper, reproduce, trials
-from terrapath.experiments.measures import (
+from terrapath.paper import experiments, figures, reproduce, trials
+from terrapath.paper.measures import (
     ExactGeodesic,
     FanSummary,
     FanTrial,
@@ -23,17 +23,18 @@ from terrapath.experiments.measures import (
     Sweep,
     SweepTrial,
 )
-from terrapath.experiments.report import make_report
-from terrapath.experiments.runner import Runner
-from terrapath.experiments.trials import Store
+from terrapath.paper.report import make_report
+from terrapath.paper.runner import Runner
+from terrapath.paper.trials import Store
 from terrapath.planners import GeodesicTraversal
+from terrapath.problem import scenes
 
 # Small enough for a test, in place of the quick scale.
 TINY = (
     "Scale(samples=400, seeds=1, repeats=2, convergence_samples=(300, 400), "
     "convergence_runs=4, directions=500)"
 )
-TINY_SCALE = eval(TINY, {"Scale": paper.Scale})
+TINY_SCALE = eval(TINY, {"Scale": experiments.Scale})
 TRIALS_OF_CONVERGENCE = 1 + 2 * 4
 
 
@@ -69,8 +70,8 @@ def program(directory, disturb, workers, when="stage == 'convergence, trees' and
         "from contextlib import contextmanager\n"
         "import terrapath.cli.resumable as command\n"
         "from terrapath.cli.main import run\n"
-        "from terrapath.experiments import reproduce\n"
-        "from terrapath.experiments.paper import Scale\n"
+        "from terrapath.paper import reproduce\n"
+        "from terrapath.paper.experiments import Scale\n"
         f"reproduce.QUICK = {TINY}\n"
         "@contextmanager\n"
         "def bar_for_each(quiet):\n"
@@ -176,7 +177,7 @@ def test_an_unknown_experiment_is_one_line_with_the_known_ones(tmp_path, capsys)
     assert run(["reproduce", "two-peaks", "--output", str(tmp_path / "new")]) == 2
     message = capsys.readouterr().err
     assert len(message.splitlines()) == 1
-    for name in ["two-peaks", "all", *paper.EXPERIMENTS]:
+    for name in ["two-peaks", "all", *experiments.EXPERIMENTS]:
         assert name in message
     assert not (tmp_path / "new").exists()
 
@@ -262,7 +263,7 @@ def test_the_key_is_the_same_in_every_process():
     trial = PathTrial("six-peaks", RRTStar(samples=10, seed=3))
     source = (
         "from terrapath import RRTStar\n"
-        "from terrapath.experiments.measures import PathTrial\n"
+        "from terrapath.paper.measures import PathTrial\n"
         "print(PathTrial('six-peaks', RRTStar(samples=10, seed=3)).key)"
     )
     environment = {**os.environ, "PYTHONHASHSEED": "7"}
@@ -273,8 +274,8 @@ def test_the_key_is_the_same_in_every_process():
 
 def test_a_true_length_that_a_path_beats_is_no_true_length():
     with pytest.raises(InputError, match="shorter than the shortest geodesic of the search"):
-        paper._check_truth("one-peak", fan_of(16.2), [16.3, 16.19])
-    paper._check_truth("one-peak", fan_of(16.2), [16.3, 16.2])
+        experiments._check_truth("one-peak", fan_of(16.2), [16.3, 16.19])
+    experiments._check_truth("one-peak", fan_of(16.2), [16.3, 16.2])
 
 
 def test_a_search_that_fails_is_one_line():
@@ -292,9 +293,9 @@ def fan_of(length):
 
 def scene_data(scene, true_length):
     paths = [PlannedPath(true_length + k / 10, true_length - 0.1, ()) for k in (1, 2, 3)]
-    steps = [paper.StepEffect(step, paths, paths) for step in paper.STEPS]
+    steps = [experiments.StepEffect(step, paths, paths) for step in experiments.STEPS]
     truth = fan_of(true_length)
-    return paper.SceneData(scene, paper.PRINTED[scene], truth, truth, steps)
+    return experiments.SceneData(scene, experiments.PRINTED[scene], truth, truth, steps)
 
 
 TRUE_LENGTHS = {"one-peak": 16.142532164, "three-peaks": 15.368572424, "six-peaks": 17.018129404}
@@ -302,7 +303,7 @@ TRUE_LENGTHS = {"one-peak": 16.142532164, "three-peaks": 15.368572424, "six-peak
 
 def test_the_tables_hold_the_papers_numbers_ours_and_the_true_lengths():
     found = {name: (scene_data(name, length), []) for name, length in TRUE_LENGTHS.items()}
-    text = make_report(found, paper.Settings())
+    text = make_report(found, experiments.Settings())
     for number in [
         *("16.19926", "16.14253", "16.50470", "15.44211", "15.37167", "16.17020"),
         *("17.18928", "17.02196", "19.43800"),
@@ -326,7 +327,7 @@ def test_the_report_says_what_was_chosen_and_what_was_left_out(finished):
 
 
 def test_the_quick_scale_says_so():
-    text = make_report({}, paper.Settings(scale=paper.QUICK))
+    text = make_report({}, experiments.Settings(scale=experiments.QUICK))
     assert "**Quick run.**" in text
 
 
@@ -336,11 +337,11 @@ def test_the_quick_scale_says_so():
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory):
     """All experiments but the scenes, at the smallest scale."""
-    settings = paper.Settings(scale=dataclasses.replace(TINY_SCALE, samples=2_000))
+    settings = experiments.Settings(scale=dataclasses.replace(TINY_SCALE, samples=2_000))
     directory = tmp_path_factory.mktemp("everything")
     runner = Runner(Store(directory), 1)
     names = ["comparative", "repeat", "sensitivity"]
-    return settings, {name: paper.EXPERIMENTS[name](settings, runner) for name in names}
+    return settings, {name: experiments.EXPERIMENTS[name](settings, runner) for name in names}
 
 
 def test_paths_without_resistance_are_shorter_until_it_is_counted(everything):
@@ -388,9 +389,9 @@ def test_pictures_and_sections_are_made(everything, tmp_path, name):
 
 def test_a_scene_is_run_and_drawn_with_four_panels(tmp_path, monkeypatch):
     scale = dataclasses.replace(TINY_SCALE, samples=1500)
-    settings = paper.Settings(scale=scale)
-    monkeypatch.setattr(paper, "STEPS", (1.0, 2.0))
-    data = paper.EXPERIMENTS["one-peak"](settings, Runner(Store(tmp_path), 1))
+    settings = experiments.Settings(scale=scale)
+    monkeypatch.setattr(experiments, "STEPS", (1.0, 2.0))
+    data = experiments.EXPERIMENTS["one-peak"](settings, Runner(Store(tmp_path), 1))
     assert data.truth.true_length == pytest.approx(16.142532164, abs=1e-8)
     assert data.traversal.true_length == pytest.approx(16.142532164, abs=1e-8)
     (path,) = data.at(1.0).rrt_star_r

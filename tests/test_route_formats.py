@@ -22,7 +22,7 @@ from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 import terrapath as tp
-from terrapath.files import folder_written_whole, require_writable
+from terrapath._support.files import folder_written_whole, require_writable
 from terrapath.io.routes import WRITERS, require_fitting_format, require_known_format
 from terrapath.io.routes.places import parts_in_degrees
 from terrapath.io.routes.profile import distinct, headings, slopes

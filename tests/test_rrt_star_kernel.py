@@ -10,11 +10,11 @@ import shapely
 
 import planner_oracles as oracles
 import terrapath as tp
-from terrapath import scenes
-from terrapath._kernels import rrt_star as kernels
-from terrapath._kernels import sampling
-from terrapath._kernels import tree as trees
+from terrapath._kernels.planners import rrt_star as kernels
+from terrapath._kernels.planners import sampling
+from terrapath._kernels.planners import tree as trees
 from terrapath.planners import tree_search
+from terrapath.problem import scenes
 
 LAYERS = {
     "six-peaks": [scenes.FOUR_PEAKS, scenes.TWO_RESISTANCE_PEAKS],

@@ -18,11 +18,12 @@ from typer.main import get_command
 import terrapath as tp
 from terrapath.cli.main import app, run
 from terrapath.errors import InputError
-from terrapath.io.scenario import read_scenario, scenario_schema
 from terrapath.io.vectors.layers import read_layers
-from terrapath.options.listing import options
-from terrapath.options.problem import LayerTable
-from terrapath.options.scenario import Scenario
+from terrapath.planners import tours
+from terrapath.scenario.listing import options
+from terrapath.scenario.problem_options import LayerTable
+from terrapath.scenario.scenario import Scenario
+from terrapath.scenario.toml import read_scenario, scenario_schema
 
 ROOT = Path(__file__).parents[1]
 QUICK = ["--samples", "400", "--no-bound"]
@@ -572,10 +573,9 @@ def test_init_overwrites_nothing_unless_forced(folder, capsys):
 
 
 def test_an_interrupt_in_a_middle_leg_writes_nothing(folder, capsys, monkeypatch):
-    from terrapath.planners import itinerary
     from terrapath.planners.base import INTERRUPT, without_path
 
-    solve = itinerary._Tour.leg
+    solve = tours._Tour.leg
 
     def interrupt(tour, leg, number, count):
         if number == 2:
@@ -588,7 +588,7 @@ def test_an_interrupt_in_a_middle_leg_writes_nothing(folder, capsys, monkeypatch
         except KeyboardInterrupt:
             return without_path(problem, "rrt", tp.Status.INTERRUPTED, INTERRUPT)
 
-    monkeypatch.setattr(itinerary._Tour, "leg", leg)
+    monkeypatch.setattr(tours._Tour, "leg", leg)
     code = run(["plan", "one-peak", "--via", "8,2", "--output", "a.json", *QUICK, "--json"])
     captured = capsys.readouterr()
     assert code == 130

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 import terrapath as tp
 from helpers import one_line, points_in
-from terrapath.experiments import nonsmooth
+from terrapath.paper import nonsmooth
 from terrapath.surface.smoothing import quantisation_step, scale_for_step, smooth
 
 BOUNDS = (-5.0, -5.0, 5.0, 5.0)

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from processes import in_another_process
-from terrapath import warmup
 from terrapath._kernels import compiler, signatures
 from terrapath.cli import compiling
 from terrapath.cli.main import run
 from terrapath.errors import InputError
+from terrapath.planners import warmup
 from terrapath.surface import Surface
 
 # What is said

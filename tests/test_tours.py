@@ -9,18 +9,18 @@ import shapely
 
 import terrapath as tp
 from terrapath.io import route_record
-from terrapath.metric import curve_length
 from terrapath.planners import (
     Finished,
     Planner,
     Progress,
-    finishing,
+    finished,
     make_finished,
     nearest,
     plan_goals,
     plan_tour,
 )
 from terrapath.planners.base import stay_put
+from terrapath.surface.metric import curve_length
 
 FAST = make_finished("fast-marching", spacing=0.4, refine=True, bound=True)
 VIA = [(5.0, 2.0), (3.0, 9.0)]
@@ -210,7 +210,7 @@ def test_a_limit_of_the_planner_within_does_not_limit_finishing(problem, monkeyp
         limits.append(time_limit)
         return solution
 
-    monkeypatch.setattr(finishing, "finish", finish)
+    monkeypatch.setattr(finished, "finish", finish)
     plan_tour(problem, Finished(planner=Timed(30.0)), VIA)
     assert limits == [None, None, None]
 

@@ -9,15 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from terrapath import FastMarching, Lattice, Problem, RRTStar, Surface, refine, scenes
-from terrapath._kernels.lengths import fill_chords, fill_line_r
-from terrapath._kernels.surfaces import fill_jets, fill_metric, fill_values
-from terrapath.bounding import Search
-from terrapath.eikonal import Medium, field_of, march_from
-from terrapath.geodesics import trace_ray
-from terrapath.metric import segment_lengths
+from terrapath import FastMarching, Lattice, Problem, RRTStar, Surface, refine
+from terrapath._kernels.surface.lengths import fill_chords, fill_line_r
+from terrapath._kernels.surface.surfaces import fill_jets, fill_metric, fill_values
+from terrapath.certificates.search import Search
+from terrapath.distance.field import Medium, field_of, march_from
+from terrapath.geodesics.rays import trace_ray
 from terrapath.planners import Dijkstra
-from terrapath.scenes import GOAL, REGION, START
+from terrapath.problem import scenes
+from terrapath.problem.scenes import GOAL, REGION, START
+from terrapath.surface.metric import segment_lengths
 
 SIDE = REGION[2] - REGION[0]  # map units
 SAMPLES = 121  # on a side, of the splines

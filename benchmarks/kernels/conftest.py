@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from terrapath.experiments.report import machine_lines
+from terrapath.paper.report import machine_lines
 
 BASELINE = Path(__file__).with_name("baseline.json")
 SLOWER = 30.0  # percent, above which a kernel is marked

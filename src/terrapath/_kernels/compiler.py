@@ -35,7 +35,7 @@ _LOG = logging.getLogger("terrapath.kernels")
 def _package_stamp() -> str:
     """Hash of the source of every kernel module."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(source.read_bytes())
     return digest.hexdigest()
 

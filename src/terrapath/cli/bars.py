@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from ..watch import Watch, watch_nothing
+from .._support.watching import Watch, watch_nothing
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID

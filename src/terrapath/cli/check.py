@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
+from ..scenario.question import Question, scenario_of
 from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
-from .question import Question, scenario_of
 
 if TYPE_CHECKING:
     from ..problem import Problem
-    from .question import Itinerary
+    from ..scenario.question import Itinerary
 
 
 def _leg(asked: Itinerary, number: int | None) -> Problem:
@@ -52,7 +52,7 @@ def check_command(
     Give the problem's options as they were given to `terrapath plan`. Exit codes: 0 it holds,
     2 it does not, or is no certificate of this problem, 5 standard output is closed or full.
     """
-    from ..certificate import Certificate
+    from ..certificates.certificate import Certificate
 
     question = Question(scenario_of(where, given))
     loaded = Certificate.load(certificate)

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
+from ..scenario.question import Question, scenario_of
 from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .outputs import require_outputs
-from .question import Question, scenario_of
 
 if TYPE_CHECKING:
-    from ..eikonal import DistanceField
+    from ..distance.field import DistanceField
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def field_command(
     scenario = scenario_of(where, given)
     outputs = Outputs(output or [], plot)
     outputs.check([where, *scenario.inputs()])
-    from ..eikonal import field_of
+    from ..distance.field import field_of
     from .report import print_field
 
     with compiling_told():

@@ -32,9 +32,9 @@ def init_command(
 
     Exit codes: 0 written, 2 bad input.
     """
-    from ..files import written_whole
-    from ..io.scenario_template import scenario_of_map, scenario_of_scene
-    from ..scenes import SCENES
+    from .._support.files import written_whole
+    from ..problem.scenes import SCENES
+    from ..scenario.template import scenario_of_map, scenario_of_scene
     from .outputs import require_ending, require_outputs
 
     file = output or Path(f"{where if where in SCENES else Path(where).stem}.toml")

@@ -10,7 +10,6 @@ import typer
 
 from .. import __version__
 from ..errors import TerrapathError
-from .benchmark import benchmark_command
 from .check import check_command
 from .exit_codes import ExitCode
 from .field import field_command
@@ -42,7 +41,6 @@ app.command("init")(init_command)
 app.command("schema")(schema_command)
 app.command("scenes")(scenes_command)
 app.command("reproduce")(reproduce_command)
-app.command("benchmark")(benchmark_command)
 app.command("warmup")(warmup_command)
 
 
@@ -76,12 +74,12 @@ def _not_shown(reason: object) -> int:
     return ExitCode.NOT_SHOWN
 
 
-def run(arguments: list[str] | None = None) -> int:
+def run(arguments: list[str] | None = None, command: typer.Typer = app) -> int:
     """Run the command and return its exit code; no error escapes as a traceback."""
-    given = sys.argv[1:] if arguments is None else arguments
+    given = sys.argv[1:] or ["--help"] if arguments is None else arguments
     try:
         with remarks():
-            return app(given or ["--help"], standalone_mode=False) or ExitCode.SOLVED
+            return command(given, standalone_mode=False) or ExitCode.SOLVED
     except UsageError as error:
         return _fail(error.format_message())
     except TerrapathError as error:

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..options.listing import Declared, options
-from ..options.option import Extent, Files
-from ..options.problem import LayerTable, LayerTables, Point, Points, Rectangle, Weights
+from ..scenario.listing import Declared, options
+from ..scenario.option import Extent, Files
+from ..scenario.problem_options import LayerTable, LayerTables, Point, Points, Rectangle, Weights
 
 Where = Annotated[
     str,
@@ -180,8 +180,3 @@ def _by_section(found: Iterable[tuple[Declared, Any]]) -> dict[str, dict[str, An
         if value is not None and value != []:
             given.setdefault(declaration.section, {})[declaration.key] = _value(declaration, value)
     return given
-
-
-def is_scenario(where: str) -> bool:
-    """Does the command's WHERE name a scenario file?"""
-    return Path(where).suffix.lower() == ".toml"

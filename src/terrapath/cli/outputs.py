@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import MapError
-from ..options.solution import OutputSection
+from ..scenario.solution_options import OutputSection
 from .remarks import remark
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def require_outputs(paths: Sequence[Path], inputs: Iterable[str]) -> None:
     """Raise MapError where a file cannot be written, is named twice, or holds an input."""
-    from ..files import require_writable
+    from .._support.files import require_writable
 
     for path in paths:
         require_writable(path)

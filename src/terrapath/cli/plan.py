@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..errors import InputError
-from ..options.problem import Point
-from ..options.scenario import Scenario
+from ..scenario.problem_options import Point
+from ..scenario.question import Itinerary, Question, scenario_of
+from ..scenario.scenario import Scenario
 from .compiling import compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .outputs import RouteOutputs
-from .question import Itinerary, Question, scenario_of
 
 if TYPE_CHECKING:
     from ..planners import Finished, GoalAnswer
@@ -87,7 +87,7 @@ def _solve(planner: Finished, asked: Itinerary, every: bool, quiet: bool) -> Ans
 
 def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
     """Is the map too large to be planned on as a whole? InputError for what needs it whole."""
-    from ..corridor import MOST_CELLS
+    from ..planners.corridor import MOST_CELLS
 
     if scenario.planner.corridor == "none" or cells <= MOST_CELLS:
         return False
@@ -107,7 +107,7 @@ def _solve_in_corridor(
     planner: Finished, question: Question, cells: int, outputs: RouteOutputs, quiet: bool
 ) -> Answer:
     """Plan on the map read coarser, and on the map itself around the route found there."""
-    from ..corridor import Part, plan_in_corridor
+    from ..planners.corridor import Part, plan_in_corridor
     from .progress import progress_bar
 
     def pose(part: Part) -> tuple[Problem, Sequence[Point]]:

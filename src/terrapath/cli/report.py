@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..certificate import Certificate
-from ..eikonal import DistanceField
-from ..memory import peak_memory
+from .._support.memory import peak_memory
+from ..certificates.certificate import Certificate
+from ..distance.field import DistanceField
 from ..planners import GoalAnswer
 from ..problem import Path, Problem, Solution, Status
 from ..surface import Layer, Surface

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..watch import Watch
+from .._support.watching import Watch
 from .resumable import run_resumable
 
 
@@ -39,7 +39,7 @@ def reproduce_command(
     """
 
     def work(watch: Watch) -> Path:
-        from ..experiments.reproduce import reproduce
+        from ..paper.reproduce import reproduce
 
         return reproduce(what, output, quick=quick, seed=seed, workers=workers, watch=watch)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from ..watch import Watch
+from .._support.watching import Watch
 from .bars import bar_for_each
 from .exit_codes import ExitCode
 from .remarks import remark

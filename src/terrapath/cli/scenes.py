@@ -8,7 +8,7 @@ def scenes_command() -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ..scenes import SCENES
+    from ..problem.scenes import SCENES
 
     table = Table("scene", "what it is", box=None, pad_edge=False)
     table.add_column("shortest length", justify="right")

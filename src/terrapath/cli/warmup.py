@@ -19,7 +19,7 @@ def warmup_command(
     They are kept on disk; NUMBA_CACHE_DIR says where. Exit codes: 0 done, 2 they cannot be
     compiled or kept, 130 interrupted (what was compiled is kept).
     """
-    from ..warmup import warm_up
+    from ..planners.warmup import warm_up
 
     started = time.perf_counter()
     with bar_for_all("compiling kernels", quiet) as watch:

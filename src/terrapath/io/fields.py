@@ -10,9 +10,9 @@ import numpy as np
 from affine import Affine
 
 from .. import __version__
-from ..eikonal import DistanceField
+from .._support.files import written_whole
+from ..distance.field import DistanceField
 from ..errors import MapError
-from ..files import written_whole
 from ..validation import Array
 
 

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import NamedTuple, Protocol
 
-from ..lattice import Lattice
 from ..problem import Problem, Solution, Status
+from ..space.lattice import Lattice
 
 # What a planner says that did not have to search.
 SEPARATED = "start and goal lie in different parts of the free space"

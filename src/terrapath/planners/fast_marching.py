@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..eikonal import DistanceField, Medium, march_from
-from ..lattice import Lattice
+from ..distance.field import DistanceField, Medium, march_from
 from ..problem import Path, Problem, Solution, Status
+from ..space.lattice import Lattice
 from ..validation import require_positive
 from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
 

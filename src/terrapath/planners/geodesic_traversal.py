@@ -11,7 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
-from ..geodesics import TOLERANCE, Geodesic, Miss, Ray, closest_approach, hit, is_bracket, trace_ray
+from ..geodesics.rays import (
+    TOLERANCE,
+    Geodesic,
+    Miss,
+    Ray,
+    closest_approach,
+    hit,
+    is_bracket,
+    trace_ray,
+)
 from ..problem import Path, Problem, Solution, Status
 from ..validation import Array, as_point, require_count, require_positive
 from .base import Callback, Progress, answer_without_search

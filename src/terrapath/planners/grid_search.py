@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels import grid_search as kernels
-from .._kernels import tree as trees
+from .._kernels.planners import grid_search as kernels
+from .._kernels.planners import tree as trees
 from ..errors import InputError
-from ..lattice import Lattice
 from ..problem import Path, Problem, Solution, Status
+from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, require_count, require_positive
 from .base import INTERRUPT, Callback, Progress, answer_without_search

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ..distinct_routes import routes_of_fields, shortest
-from ..eikonal import DistanceField, Medium, march_from
+from ..distance.field import DistanceField, Medium, march_from
 from ..errors import warn_unfinished
+from ..geodesics.alternatives import routes_of_fields, shortest
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
 from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
-from .finishing import bounded
+from .finished import bounded
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..problem import Problem, Solution
 from .base import Callback, Planner
 from .fast_marching import FastMarching
-from .finishing import Finished, finish
+from .finished import Finished, finish
 from .geodesic_traversal import GeodesicTraversal
 from .grid_search import AStar, Dijkstra
 from .optimal import Optimal

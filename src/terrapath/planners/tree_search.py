@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .._kernels import rrt_star as kernels
-from .._kernels import tree as trees
-from .._kernels.buckets import Buckets
+from .._kernels.planners import rrt_star as kernels
+from .._kernels.planners import tree as trees
+from .._kernels.planners.buckets import Buckets
 from ..problem import History, Path, Problem, SearchTree, Solution, Status
 from ..surface import Surface
 from ..validation import Array

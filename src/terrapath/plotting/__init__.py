@@ -1,15 +1,5 @@
-"""Floor 6: figures."""
+"""Figures."""
 
-from .figure import draw_field, draw_profile, draw_route, plot_field, plot_profile, plot_route
-from .page import draw_page, plot_page
+import lazy_loader
 
-__all__ = [
-    "draw_field",
-    "draw_page",
-    "draw_profile",
-    "draw_route",
-    "plot_field",
-    "plot_page",
-    "plot_profile",
-    "plot_route",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

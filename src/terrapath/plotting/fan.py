@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 
-from ..geodesics import Ray
+from ..geodesics.rays import Ray
 from ..planners import Fan
 from ..problem import Problem
 from ..validation import Array

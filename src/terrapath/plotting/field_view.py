@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.ticker import MaxNLocator
 
-from ..eikonal import DistanceField
+from ..distance.field import DistanceField
 from ..problem import Problem
 from ..validation import Array
 from .labels import AxisUnit

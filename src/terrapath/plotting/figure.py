@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..eikonal import DistanceField
+from .._support.files import written_whole
+from ..distance.field import DistanceField
 from ..errors import MapError
-from ..files import written_whole
 from ..problem import Solution
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances

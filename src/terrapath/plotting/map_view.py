@@ -15,8 +15,8 @@ from matplotlib.path import Path as Outline
 from scipy.ndimage import gaussian_filter
 from shapely import LineString, Point, Polygon
 
-from ..free_space import Parts, sort_obstacles
 from ..problem import Problem, Solution
+from ..space.free_space import Parts, sort_obstacles
 from .labels import format_length, label_axes
 from .terrain import LAYER_COLOURS, Terrain, height_colours
 

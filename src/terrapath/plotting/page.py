@@ -11,13 +11,13 @@ import shapely
 from matplotlib.colors import to_hex
 from scipy.ndimage import map_coordinates
 
+from .._support.files import written_whole
 from ..errors import MapError
-from ..files import written_whole
-from ..free_space import sort_obstacles
 from ..io.routes.profile import clean, slopes
 from ..io.routes.units import height_scale
 from ..problem import Path as Route
 from ..problem import Solution
+from ..space.free_space import sort_obstacles
 from ..validation import Array
 from .labels import format_length
 from .map_view import ALTERNATIVE_COLOURS, PATH_COLOUR

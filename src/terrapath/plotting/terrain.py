@@ -13,8 +13,8 @@ import shapely
 from matplotlib import colormaps
 from matplotlib.colors import LightSource, Normalize
 
-from ..free_space import Circle, sort_obstacles
 from ..problem import Problem
+from ..space.free_space import Circle, sort_obstacles
 from ..surface import Mask
 from ..validation import Array
 from .labels import with_unit

@@ -1,8 +1,5 @@
-"""Floor 1: surfaces. See ``surface.Surface``."""
+"""Surfaces, their metric, and how they are made of maps and functions."""
 
-from .layers import Layer
-from .mask import Mask
-from .smoothing import Smoothing
-from .surface import Fit, Surface
+import lazy_loader
 
-__all__ = ["Fit", "Layer", "Mask", "Smoothing", "Surface"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

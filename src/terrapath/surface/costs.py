@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._kernels.surfaces import Peaks, Spline
+from .._kernels.surface.surfaces import Peaks, Spline
 from ..errors import InputError
 from ..validation import Array, Bounds
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._kernels.surfaces import Spline, fill_jets, fill_values
+from .._kernels.surface.surfaces import Spline, fill_jets, fill_values
 from ..errors import FitError, InputError
 from ..validation import Array, Bounds
 from .blocks import blocks

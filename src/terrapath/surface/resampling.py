@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from .._kernels.surfaces import Spline, fill_values
+from .._kernels.surface.surfaces import Spline, fill_values
 from ..errors import MapError
 from ..validation import Array
 from .blocks import blocks

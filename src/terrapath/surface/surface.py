@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .._kernels.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
+from .._kernels.surface.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import (
     Array,

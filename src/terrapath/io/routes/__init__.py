@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from ..._support.files import BAG_ENDING, folder_written_whole, written_whole
 from ...errors import MapError
-from ...files import BAG_ENDING, folder_written_whole, written_whole
 from ...problem import Solution
 from ...surface.georeference import Georeference
 from . import geojson, geopackage, gpx, ros, table

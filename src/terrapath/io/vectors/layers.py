@@ -16,7 +16,7 @@ from pyproj.exceptions import CRSError
 from shapely.geometry.base import BaseGeometry
 
 from ...errors import MapError, TerrapathWarning
-from ...free_space import Geometries, Indices, simple_parts
+from ...space.free_space import Geometries, Indices, simple_parts
 
 FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30

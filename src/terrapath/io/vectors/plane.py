@@ -14,7 +14,7 @@ from pyproj.exceptions import ProjError
 from shapely.geometry.base import BaseGeometry
 
 from ...errors import InputError, MapError
-from ...free_space import POINTS, Geometries, outlines, simple_parts
+from ...space.free_space import POINTS, Geometries, outlines, simple_parts
 from ...surface import Surface
 from ...surface.georeference import Georeference
 from ...validation import Array, Bounds

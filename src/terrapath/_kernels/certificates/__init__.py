@@ -1,0 +1,1 @@
+"""Kernels of certificates: Taylor models and what they prove of a cell."""

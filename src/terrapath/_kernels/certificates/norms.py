@@ -1,0 +1,392 @@
+"""What is proven of a function u over boxes; the checker's own, and nothing of the solver's."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler import inner_kernel, kernel
+from ..surface.surfaces import floor_of
+from .surface_models import Box, cut_at_knots, layer_over, spline_models, times_squared_cost
+from .taylor import (
+    Model,
+    constant,
+    cross,
+    keep,
+    kept,
+    minus,
+    plus,
+    polynomial,
+    spread,
+    times,
+    times_number,
+)
+
+
+class Bound(NamedTuple):
+    """A function u, bicubic over the cells of a grid."""
+
+    coefficients: np.ndarray  # (ny + 2, nx + 2) float64
+    x0: float  # corner of the first cell
+    y0: float
+    dx: float
+    dy: float
+
+
+@inner_kernel
+def share_of_cell(share, half):
+    """The share of its cell at which a box has its centre, exact for a box on the cell's side.
+
+    There one of four coefficients counts for nothing. The cube of a rounding error would let
+    it count, and it may be as large as somebody likes where no cell depends on it.
+    """
+    return math.floor(share + 0.5) if half == 0.0 else share
+
+
+@inner_kernel
+def bound_over(bound, i, j, box):
+    """Models of u and its slopes over a box inside cell (i, j), or on a side of it."""
+    return spline_models(
+        bound.coefficients,
+        i,
+        j,
+        share_of_cell((box.x - bound.x0) / bound.dx - i, box.a),
+        share_of_cell((box.y - bound.y0) / bound.dy - j, box.b),
+        box.a / bound.dx,
+        box.b / bound.dy,
+        bound.dx,
+        bound.dy,
+    )
+
+
+# What is proven of a box
+
+
+class Facts(NamedTuple):
+    """What is proven of one box."""
+
+    norm: float  # at least the square of the dual norm of du anywhere in the box
+    sample: float  # its largest value at nine points, but for the remainders
+    lowest: float  # at most u anywhere in the box
+    chord: float  # at most the chord from anywhere in the box to the goal, times the least cost
+
+
+@inner_kernel
+def outside(low, high, value):
+    """Distance of a value from an interval."""
+    return max(low - value, value - high, 0.0)
+
+
+@inner_kernel
+def largest_ratio(top, bottom):
+    """The largest top / bottom at the corners, the middles of the sides and the centre."""
+    largest = 0.0
+    for m in range(9):
+        p, q = m % 3 - 1.0, m // 3 - 1.0
+        largest = max(largest, polynomial(top, p, q) / polynomial(bottom, p, q))
+    return largest
+
+
+@inner_kernel
+def planar_distance(box, goal):
+    """Distance of a box from the goal on the plane."""
+    east = outside(box.x - box.a, box.x + box.a, goal[0])
+    north = outside(box.y - box.b, box.y + box.b, goal[1])
+    return math.hypot(east, north)
+
+
+@kernel
+def facts_of_box(surface, bound, goal, i, j, box, work):
+    """Bounds over a box inside cell (i, j) and one piece of the surface.
+
+    With slopes g_k of the weighted layers, h = c^2 H, H = I + sum g_k g_k^T and
+
+        c^2 |du|_h^2 det H = |du|^2 + sum_k (du x g_k)^2,
+        det H = 1 + sum_k |g_k|^2 + sum_{k<l} (g_k x g_l)^2.
+
+    goal (2 + layers,) is the goal's lifted point; work (2 layers, 11).
+    """
+    u = bound_over(bound, i, j, box)
+    top = plus(times(u.slope_x, u.slope_x), times(u.slope_y, u.slope_y))
+    bottom = constant(1.0)
+    chord = planar_distance(box, goal) ** 2
+    for k in range(surface.weights.shape[0]):
+        f = layer_over(surface, k, box)
+        keep(work, 2 * k, f.slope_x)
+        keep(work, 2 * k + 1, f.slope_y)
+        twist = cross(u.slope_x, u.slope_y, f.slope_x, f.slope_y)
+        top = plus(top, times(twist, twist))
+        bottom = plus(bottom, times(f.slope_x, f.slope_x))
+        bottom = plus(bottom, times(f.slope_y, f.slope_y))
+        for m in range(k):
+            twist = cross(f.slope_x, f.slope_y, kept(work, 2 * m), kept(work, 2 * m + 1))
+            bottom = plus(bottom, times(twist, twist))
+        reach = spread(f.value)
+        chord += outside(f.value.c00 - reach, f.value.c00 + reach, goal[2 + k]) ** 2
+    bottom = times_squared_cost(surface, box, bottom)
+    middle = top.c00 / bottom.c00
+    excess = minus(top, times_number(bottom, middle))
+    floor = floor_of(surface)
+    least = max(bottom.c00 - spread(bottom), floor * floor)
+    return Facts(
+        middle + (abs(excess.c00) + spread(excess)) / least,
+        largest_ratio(top, bottom),
+        u.value.c00 - spread(u.value),
+        floor * math.sqrt(chord),
+    )
+
+
+# What the cells need
+
+
+class Need(NamedTuple):
+    """An M that is enough for a box, and what nine points of it need."""
+
+    proven: float
+    likely: float
+    slope: float  # the dual norm at those points
+
+
+@inner_kernel
+def need_of_box(facts, horizon):
+    """The least M for which a box proves nothing wrong.
+
+    Either the dual norm is at most M everywhere in it, or u / M and the chord to the goal
+    add up to horizon / M anywhere in it, so that no path through it is shorter.
+    """
+    # Of what overflowed, and so may be no number, nothing is proven.
+    slope = math.sqrt(max(facts.norm, 0.0)) if facts.norm < math.inf else math.inf
+    likely = math.sqrt(max(facts.sample, 0.0)) if facts.sample < math.inf else math.inf
+    short = horizon - facts.lowest
+    way_out = math.inf
+    if short <= 0.0:
+        way_out = 0.0
+    elif short < math.inf and 0.0 < facts.chord < math.inf:
+        way_out = short / facts.chord
+    return Need(min(slope, way_out), min(likely, way_out), likely)
+
+
+class Cutting(NamedTuple):
+    """Room for the pieces of a cell."""
+
+    x: np.ndarray
+    y: np.ndarray
+    work: np.ndarray  # (2 layers, 11)
+    boxes: np.ndarray  # (3 DEPTH + 1, 5): centre, half widths and depth of boxes that wait
+
+
+@inner_kernel
+def piece(cutting, p, q):
+    """The box of one piece of a cell that is cut at the surface's knots."""
+    return Box(
+        0.5 * (cutting.x[p] + cutting.x[p + 1]),
+        0.5 * (cutting.y[q] + cutting.y[q + 1]),
+        0.5 * (cutting.x[p + 1] - cutting.x[p]),
+        0.5 * (cutting.y[q + 1] - cutting.y[q]),
+    )
+
+
+class Pieces(NamedTuple):
+    """How many pieces a cell is cut into, each way."""
+
+    columns: int
+    rows: int
+
+
+@inner_kernel
+def cut_cell(surface, bound, i, j, cutting):
+    x, y = bound.x0 + i * bound.dx, bound.y0 + j * bound.dy
+    return Pieces(
+        cut_at_knots(surface, 0, x, x + bound.dx, cutting.x),
+        cut_at_knots(surface, 1, y, y + bound.dy, cutting.y),
+    )
+
+
+@kernel
+def need_of_cell(surface, bound, goal, horizon, i, j, cutting):
+    """The least M of cell (i, j), as the models over its whole pieces tell."""
+    pieces = cut_cell(surface, bound, i, j, cutting)
+    proven, likely, slope = 0.0, 0.0, 0.0
+    for q in range(pieces.rows):
+        for p in range(pieces.columns):
+            box = piece(cutting, p, q)
+            facts = facts_of_box(surface, bound, goal, i, j, box, cutting.work)
+            need = need_of_box(facts, horizon)
+            proven, likely = max(proven, need.proven), max(likely, need.likely)
+            slope = max(slope, need.slope)
+    return Need(proven, likely, slope)
+
+
+# A box is cut in four where M could be lower for it by this share, and so often at most.
+WORTHWHILE = 2e-5
+
+
+DEPTH = 6
+
+
+@kernel
+def norm_of_box(surface, bound, goal, horizon, i, j, box, norm, cutting):
+    """The least M, ``norm`` or above, that is enough for a box; it is cut up where that helps."""
+    boxes = cutting.boxes
+    boxes[0, 0], boxes[0, 1], boxes[0, 2], boxes[0, 3], boxes[0, 4] = (
+        box.x,
+        box.y,
+        box.a,
+        box.b,
+        0.0,
+    )
+    waiting = 1
+    while waiting > 0:
+        waiting -= 1
+        x, y, a, b, depth = boxes[waiting]
+        facts = facts_of_box(surface, bound, goal, i, j, Box(x, y, a, b), cutting.work)
+        need = need_of_box(facts, horizon)
+        if need.proven <= norm:
+            continue
+        if depth == DEPTH or need.proven <= (1.0 + WORTHWHILE) * need.likely:
+            norm = need.proven
+            continue
+        for m in range(4):
+            boxes[waiting, 0] = x + (m % 2 - 0.5) * a
+            boxes[waiting, 1] = y + (m // 2 - 0.5) * b
+            boxes[waiting, 2], boxes[waiting, 3] = 0.5 * a, 0.5 * b
+            boxes[waiting, 4] = depth + 1.0
+            waiting += 1
+    return norm
+
+
+@kernel
+def cheap_need(floor, bound, goal, horizon, i, j):
+    """An M that is enough for cell (i, j), from u's coefficients and the planar distance alone."""
+    lowest = math.inf
+    for q in range(4):
+        for k in range(4):
+            lowest = min(lowest, bound.coefficients[j + q, i + k])
+    if lowest >= horizon:
+        return 0.0
+    half_x, half_y = 0.5 * bound.dx, 0.5 * bound.dy
+    box = Box(bound.x0 + i * bound.dx + half_x, bound.y0 + j * bound.dy + half_y, half_x, half_y)
+    distance = floor * planar_distance(box, goal)
+    return (horizon - lowest) / distance if distance > 0.0 else math.inf
+
+
+@kernel
+def fill_needs(surface, bound, goal, horizon, exempt, enough, cutting, proven, likely, slope):
+    """An M that is enough for each cell (ny, nx), 0 where exempt; not looked at closely.
+
+    ``enough`` : an M that is fine, so that nothing better is looked for.
+    """
+    for j in range(proven.shape[0]):
+        for i in range(proven.shape[1]):
+            proven[j, i] = 0.0
+            if not exempt[j, i]:
+                proven[j, i] = cheap_need(floor_of(surface), bound, goal, horizon, i, j)
+            likely[j, i], slope[j, i] = proven[j, i], 0.0
+            if proven[j, i] > enough:
+                need = need_of_cell(surface, bound, goal, horizon, i, j, cutting)
+                proven[j, i] = min(proven[j, i], need.proven)
+                likely[j, i] = min(proven[j, i], need.likely)
+                slope[j, i] = need.slope
+
+
+@kernel
+def least_norm(surface, bound, goal, horizon, order, needs, norm, cutting):
+    """The least M, ``norm`` or above, that is enough for all cells.
+
+    needs (ny, nx) : what is proven to be enough. order : numbers of the cells, by falling
+    need, so that those which settle M are looked at first.
+    """
+    columns = needs.shape[1]
+    for n in order:
+        i, j = n % columns, n // columns
+        if needs[j, i] <= norm:
+            break
+        found = norm
+        pieces = cut_cell(surface, bound, i, j, cutting)
+        for q in range(pieces.rows):
+            for p in range(pieces.columns):
+                box = piece(cutting, p, q)
+                found = norm_of_box(surface, bound, goal, horizon, i, j, box, found, cutting)
+        norm = min(found, needs[j, i])
+    return norm
+
+
+# The margin on a core's edge
+
+
+class Anchor(NamedTuple):
+    """An end of all paths, and how far it is from a point p nearby at least.
+
+    That is the lesser of ``floor`` times the chord and ``far``: as long as a path stays around
+    the anchor no cost is below the floor, and when it leaves it is ``far`` long already.
+    """
+
+    lifted: np.ndarray  # (2 + layers,)
+    floor: float
+    far: float
+
+
+@kernel
+def margin_of_box(surface, bound, anchor, factor, i, j, box):
+    """At most distance(anchor, p) + factor u(p) for any p of a box inside cell (i, j).
+
+    The chord is convex in R^n, so that it is nowhere below its tangent at the box's centre.
+    """
+    floor, end = anchor.floor, anchor.lifted
+    east, north = box.x - end[0], box.y - end[1]
+    squared = east * east + north * north
+    for k in range(surface.weights.shape[0]):
+        rise = layer_over(surface, k, box).value.c00 - end[2 + k]
+        squared += rise * rise
+    chord = math.sqrt(squared)
+    total = times_number(bound_over(bound, i, j, box).value, factor)
+    outside_margin = anchor.far + total.c00 - spread(total)
+    if chord > 0.0:
+        along_x, along_y = floor * box.a * east / chord, floor * box.b * north / chord
+        tangent = Model(floor * chord, along_x, along_y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        total = plus(total, tangent)
+        for k in range(surface.weights.shape[0]):
+            value = layer_over(surface, k, box).value
+            offset = minus(value, constant(value.c00))
+            rise = value.c00 - end[2 + k]
+            total = plus(total, times_number(offset, floor * rise / chord))
+    margin = min(total.c00 - spread(total), outside_margin)
+    # No number, where something overflowed.
+    return margin if margin > -math.inf else -math.inf
+
+
+# A cell's side on the core's edge is cut into so many parts.
+PARTS = 8
+
+
+@kernel
+def margin_of_side(surface, bound, anchor, factor, i, j, axis, at, cutting):
+    """The least margin along a side of cell (i, j): along ``axis``, at ``at`` on the other."""
+    low = bound.x0 + i * bound.dx if axis == 0 else bound.y0 + j * bound.dy
+    high = low + (bound.dx if axis == 0 else bound.dy)
+    cuts = cutting.x if axis == 0 else cutting.y
+    margin = math.inf
+    for k in range(cut_at_knots(surface, axis, low, high, cuts)):
+        half = 0.5 * (cuts[k + 1] - cuts[k]) / PARTS
+        for m in range(PARTS):
+            middle = cuts[k] + (2 * m + 1) * half
+            box = Box(middle, at, half, 0.0) if axis == 0 else Box(at, middle, 0.0, half)
+            margin = min(margin, margin_of_box(surface, bound, anchor, factor, i, j, box))
+    return margin
+
+
+@kernel
+def margin_of_core(surface, bound, anchor, factor, i0, i1, j0, j1, cutting):
+    """The least margin on the edge of the cells [i0, i1) x [j0, j1)."""
+    margin = math.inf
+    left, right = bound.x0 + i0 * bound.dx, bound.x0 + i1 * bound.dx
+    bottom, top = bound.y0 + j0 * bound.dy, bound.y0 + j1 * bound.dy
+    for i in range(i0, i1):
+        for j, at in ((j0, bottom), (j1 - 1, top)):
+            side = margin_of_side(surface, bound, anchor, factor, i, j, 0, at, cutting)
+            margin = min(margin, side)
+    for j in range(j0, j1):
+        for i, at in ((i0, left), (i1 - 1, right)):
+            side = margin_of_side(surface, bound, anchor, factor, i, j, 1, at, cutting)
+            margin = min(margin, side)
+    return margin

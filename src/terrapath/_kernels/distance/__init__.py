@@ -1,0 +1,1 @@
+"""Kernels of distance fields: stencils, fast marching, descent."""

@@ -1,0 +1,389 @@
+"""Values between the nodes of a distance field, and the way back to the source.
+
+Where the field is smooth, both follow from cubic interpolation. At kinks, where shortest
+paths from two sides meet, the scheme's own values are a little too low and a cubic's slope
+is a mean of both sides; near obstacles and unsettled nodes there is no cubic. There the
+value of a point p is, by Bellman's principle, the least of u(q) plus the length from q to p
+over the places q of a ring of nodes around p that can be seen from it.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler import inner_kernel, kernel
+from ..space.free_space import Grid, segment_is_free
+from ..surface.lengths import line_r
+from ..surface.surfaces import metric_at
+from .stencils import inverse
+
+
+class Field(NamedTuple):
+    """A distance field and where it lies."""
+
+    u: np.ndarray  # (ny, nx) float64, infinite where not settled
+    grid: Grid
+    source_x: float
+    source_y: float
+    has_obstacles: bool
+
+
+# Smooth places
+
+
+class Patch(NamedTuple):
+    """The value of u at a point, and its slope per node."""
+
+    value: float
+    x: float
+    y: float
+
+
+@inner_kernel
+def cubic(u):
+    """Weights of the four nodes around u in [0, 1] by cubic convolution (Keys 1981)."""
+    r = 1.0 - u
+    return (
+        -0.5 * u * r * r,
+        1.0 + u * u * (1.5 * u - 2.5),
+        1.0 + r * r * (1.5 * r - 2.5),
+        -0.5 * r * u * u,
+    )
+
+
+@inner_kernel
+def cubic_slope(u):
+    """First derivatives of ``cubic``."""
+    r = 1.0 - u
+    return (
+        -0.5 * r * (r - 2.0 * u),
+        u * (4.5 * u - 5.0),
+        r * (5.0 - 4.5 * r),
+        0.5 * u * (u - 2.0 * r),
+    )
+
+
+@inner_kernel
+def first_node(s, count):
+    """The first of the four nodes that the cubic at s takes part of, on an axis of ``count``."""
+    return min(max(math.floor(s) - 1, 0), count - 4)
+
+
+@inner_kernel
+def folded(w, cell, count):
+    """Weights of the four nodes; in the outermost cells there are three, by extrapolation."""
+    if cell <= 0:
+        return w[1] + 3.0 * w[0], w[2] - 3.0 * w[0], w[3] + w[0], 0.0
+    if cell >= count - 2:
+        return 0.0, w[0] + w[3], w[1] - 3.0 * w[3], w[2] + 3.0 * w[3]
+    return w
+
+
+@kernel
+def interpolate(u, s, t):
+    """The field u (ny, nx) and its slopes at column s and row t; infinite near unsettled nodes."""
+    ny, nx = u.shape
+    i = min(max(math.floor(s), 0), nx - 2)
+    j = min(max(math.floor(t), 0), ny - 2)
+    wx, sx = folded(cubic(s - i), i, nx), folded(cubic_slope(s - i), i, nx)
+    wy, sy = folded(cubic(t - j), j, ny), folded(cubic_slope(t - j), j, ny)
+    i, j = first_node(s, nx), first_node(t, ny)
+    value, slope_x, slope_y = 0.0, 0.0, 0.0
+    for q in range(4):
+        row, row_slope = 0.0, 0.0
+        for p in range(4):
+            node = u[j + q, i + p]
+            if node == math.inf:
+                return Patch(math.inf, 0.0, 0.0)
+            row += wx[p] * node
+            row_slope += sx[p] * node
+        value += wy[q] * row
+        slope_x += wy[q] * row_slope
+        slope_y += sy[q] * row
+    return Patch(value, slope_x, slope_y)
+
+
+# The eikonal equation makes the dual norm of a slope 1. At a kink the cubic's slope is a mean
+# of two, so that its norm is less; a place is smooth where it is not less by this share.
+ROUGH = 0.01
+
+
+class Slope(NamedTuple):
+    """The value of u at a smooth place, and the direction of steepest ascent under h.
+
+    The value is infinite where the place is not smooth.
+    """
+
+    value: float
+    x: float
+    y: float
+
+
+ROUGH_PLACE = Slope(math.inf, 0.0, 0.0)
+
+
+@inner_kernel
+def sees_cell(space, grid, x, y):
+    """Can the 16 nodes of the cubic at (x, y) be seen from there?"""
+    i = first_node((x - grid.x0) / grid.dx, grid.nx)
+    j = first_node((y - grid.y0) / grid.dy, grid.ny)
+    for q in range(4):
+        for p in range(4):
+            nx, ny = grid.x0 + (i + p) * grid.dx, grid.y0 + (j + q) * grid.dy
+            if not segment_is_free(space, x, y, nx, ny):
+                return False
+    return True
+
+
+@kernel
+def slope_at(surface, space, field, x, y):
+    """The field at (x, y), where it is smooth there."""
+    grid = field.grid
+    s, t = (x - grid.x0) / grid.dx, (y - grid.y0) / grid.dy
+    if min(grid.nx, grid.ny) < 4 or not (0.0 <= s <= grid.nx - 1 and 0.0 <= t <= grid.ny - 1):
+        return ROUGH_PLACE
+    patch = interpolate(field.u, s, t)
+    if patch.value == math.inf or (field.has_obstacles and not sees_cell(space, grid, x, y)):
+        return ROUGH_PLACE
+    d = inverse(metric_at(surface, x, y))
+    gx, gy = patch.x / grid.dx, patch.y / grid.dy
+    vx, vy = d.h11 * gx + d.h12 * gy, d.h12 * gx + d.h22 * gy
+    if not gx * vx + gy * vy >= (1.0 - ROUGH) * (1.0 - ROUGH):
+        return ROUGH_PLACE
+    size = math.hypot(vx, vy)
+    return Slope(patch.value, vx / size, vy / size)
+
+
+# Anywhere
+
+
+class Approach(NamedTuple):
+    """The last stretch of a shortest path to a point: where it begins, u there and at the end.
+
+    It begins below the level.
+    """
+
+    x: float
+    y: float
+    begin: float
+    end: float
+    level: float
+
+
+# Half the side of the ring around a point, in nodes. The scheme's values are too low up to
+# a node or two away from a kink; from this far away that makes no difference.
+RING = 3
+
+
+@kernel
+def better(surface, space, field, best, qx, qy, u, x, y):
+    """The approach to (x, y) from q, if it is free and shorter than the best so far."""
+    if not (u < best.end and u < best.level):
+        return best
+    end = u + line_r(surface, qx, qy, x, y)
+    if end < best.end and (not field.has_obstacles or segment_is_free(space, x, y, qx, qy)):
+        return Approach(qx, qy, u, end, best.level)
+    return best
+
+
+@inner_kernel
+def best_share(h, ax, ay, bx, by, rise):
+    """The t in [0, 1] that makes t rise + |p - q(t)| least, p - q(t) = a - t b."""
+    bb = h.h11 * bx * bx + 2.0 * h.h12 * bx * by + h.h22 * by * by
+    ab = h.h11 * ax * bx + h.h12 * (ax * by + ay * bx) + h.h22 * ay * by
+    aa = h.h11 * ax * ax + 2.0 * h.h12 * ax * ay + h.h22 * ay * ay
+    if rise * rise >= bb:
+        return 0.0 if rise > 0.0 else 1.0
+    across = max(aa - ab * ab / bb, 0.0)
+    t = ab / bb - rise * math.sqrt(across / (bb * (bb - rise * rise)))
+    return min(max(t, 0.0), 1.0)
+
+
+@kernel
+def better_on_edge(surface, space, field, best, h, i, j, step_i, step_j, x, y):
+    """As ``better``, from any place between the nodes (i, j) and (i, j) + step."""
+    grid = field.grid
+    a, b = field.u[j, i], field.u[j + step_j, i + step_i]
+    if not (max(a, b) < math.inf and min(a, b) < best.end):
+        return best
+    ax, ay = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
+    ex, ey = step_i * grid.dx, step_j * grid.dy
+    if field.has_obstacles and not segment_is_free(space, ax, ay, ax + ex, ay + ey):
+        return best
+    t = best_share(h, x - ax, y - ay, ex, ey, b - a)
+    return better(surface, space, field, best, ax + t * ex, ay + t * ey, a + t * (b - a), x, y)
+
+
+class Ring(NamedTuple):
+    """A rectangle of nodes around a cell, beyond the lattice in part."""
+
+    i0: int
+    j0: int
+    i1: int
+    j1: int
+
+
+@inner_kernel
+def ring_around(grid, x, y, r):
+    """The ring r nodes away from the cell that holds (x, y)."""
+    i = min(max(math.floor((x - grid.x0) / grid.dx), 0), grid.nx - 2)
+    j = min(max(math.floor((y - grid.y0) / grid.dy), 0), grid.ny - 2)
+    return Ring(i - r, j - r, i + 1 + r, j + 1 + r)
+
+
+@kernel
+def best_on_side(surface, space, field, best, h, i, j, step_i, step_j, count, x, y):
+    """The best of the nodes (i, j) + k step and of what lies between them, 0 <= k < count."""
+    grid = field.grid
+    for k in range(count):
+        p, q = i + k * step_i, j + k * step_j
+        if 0 <= p < grid.nx and 0 <= q < grid.ny:
+            px, py = grid.x0 + p * grid.dx, grid.y0 + q * grid.dy
+            best = better(surface, space, field, best, px, py, field.u[q, p], x, y)
+            last = k == count - 1 or p + step_i >= grid.nx or q + step_j >= grid.ny
+            if not last:
+                best = better_on_edge(surface, space, field, best, h, p, q, step_i, step_j, x, y)
+    return best
+
+
+@kernel
+def best_on_ring(surface, space, field, best, h, ring, x, y):
+    """The best approach to (x, y) from a ring, or the one given."""
+    wide, high = ring.i1 - ring.i0 + 1, ring.j1 - ring.j0 + 1
+    for j in (ring.j0, ring.j1):
+        best = best_on_side(surface, space, field, best, h, ring.i0, j, 1, 0, wide, x, y)
+    for i in (ring.i0, ring.i1):
+        best = best_on_side(surface, space, field, best, h, i, ring.j0, 0, 1, high, x, y)
+    return best
+
+
+@inner_kernel
+def is_open(space, field, i, j, x, y):
+    """Is a node of a ring settled and seen from (x, y), or outside the lattice?"""
+    grid = field.grid
+    if not (0 <= i < grid.nx and 0 <= j < grid.ny):
+        return True
+    if field.u[j, i] == math.inf:
+        return False
+    px, py = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
+    return not field.has_obstacles or segment_is_free(space, x, y, px, py)
+
+
+@kernel
+def ring_is_open(space, field, ring, x, y):
+    """Can all nodes of a ring be seen, so that every path crosses it?"""
+    grid = field.grid
+    if ring.i0 < 0 and ring.j0 < 0 and ring.i1 >= grid.nx and ring.j1 >= grid.ny:
+        return False
+    for i in range(ring.i0, ring.i1 + 1):
+        if not (
+            is_open(space, field, i, ring.j0, x, y) and is_open(space, field, i, ring.j1, x, y)
+        ):
+            return False
+    for j in range(ring.j0, ring.j1 + 1):
+        if not (
+            is_open(space, field, ring.i0, j, x, y) and is_open(space, field, ring.i1, j, x, y)
+        ):
+            return False
+    return True
+
+
+@inner_kernel
+def nodes_apart(grid, ax, ay, bx, by):
+    """Distance of two points in nodes."""
+    return math.hypot((ax - bx) / grid.dx, (ay - by) / grid.dy)
+
+
+@kernel
+def approach(surface, space, field, x, y, level):
+    """The best approach to (x, y) from around, and from the source where that is near.
+
+    It begins where u is less than ``level``; ``end`` is infinite where there is none. Smaller
+    rings are looked at only where something blocks the view of the larger.
+    """
+    grid, best = field.grid, Approach(x, y, math.inf, math.inf, level)
+    if nodes_apart(grid, x, y, field.source_x, field.source_y) <= RING + 1.0:
+        best = better(surface, space, field, best, field.source_x, field.source_y, 0.0, x, y)
+    h = metric_at(surface, x, y)
+    for r in range(RING, -1, -1):
+        ring = ring_around(grid, x, y, r)
+        best = best_on_ring(surface, space, field, best, h, ring, x, y)
+        if ring_is_open(space, field, ring, x, y):
+            break
+    return best
+
+
+@kernel
+def fill_distances(surface, space, field, points, values):
+    """The field at points (m, 2) of the lattice's rectangle, infinite where it was not solved."""
+    for m in range(points.shape[0]):
+        x, y = points[m, 0], points[m, 1]
+        values[m] = slope_at(surface, space, field, x, y).value
+        if values[m] == math.inf:
+            values[m] = approach(surface, space, field, x, y, math.inf).end
+
+
+# The way back to the source
+
+
+@inner_kernel
+def clamp(x, low, high):
+    return min(max(x, low), high)
+
+
+@inner_kernel
+def step_down(grid, x, y, slope, step):
+    """A step of so many nodes against a slope, kept on the lattice."""
+    step /= nodes_apart(grid, slope.x, slope.y, 0.0, 0.0)
+    right, top = grid.x0 + (grid.nx - 1) * grid.dx, grid.y0 + (grid.ny - 1) * grid.dy
+    return clamp(x - step * slope.x, grid.x0, right), clamp(y - step * slope.y, grid.y0, top)
+
+
+@kernel
+def descend(surface, space, field, x, y, level, step):
+    """The next point of a path down the field from (x, y), and u there or just before.
+
+    A midpoint step where the field is smooth and less than ``level``; else the best approach.
+    """
+    grid, slope = field.grid, slope_at(surface, space, field, x, y)
+    if slope.value < math.inf:
+        mx, my = step_down(grid, x, y, slope, 0.5 * step)
+        slope = slope_at(surface, space, field, mx, my)
+        if slope.value < level:
+            nx, ny = step_down(grid, x, y, slope, step)
+            if not field.has_obstacles or segment_is_free(space, x, y, nx, ny):
+                return Slope(slope.value, nx, ny)
+    best = approach(surface, space, field, x, y, level)
+    if best.end == math.inf:
+        return ROUGH_PLACE
+    share = min(step / nodes_apart(grid, x, y, best.x, best.y), 1.0)
+    value = best.end + share * (best.begin - best.end)
+    if not value < level:
+        share, value = 1.0, best.begin
+    return Slope(value, x + share * (best.x - x), y + share * (best.y - y))
+
+
+# A path ends with a straight step where it is so near to the source, in nodes.
+ARRIVED = 2.0
+
+
+@kernel
+def trace(surface, space, field, step, points):
+    """Walk down the field from points[0] to the source; returns how many points.
+
+    step : of the walk, in nodes. Returns 0 where the walk does not arrive.
+    """
+    level = math.inf
+    x, y = points[0, 0], points[0, 1]
+    for m in range(1, points.shape[0]):
+        near = nodes_apart(field.grid, x, y, field.source_x, field.source_y) <= ARRIVED
+        if near and segment_is_free(space, x, y, field.source_x, field.source_y):
+            points[m, 0], points[m, 1] = field.source_x, field.source_y
+            return m + 1
+        place = descend(surface, space, field, x, y, level, step)
+        if place.value == math.inf:
+            return 0
+        level, x, y = place.value, place.x, place.y
+        points[m, 0], points[m, 1] = x, y
+    return 0

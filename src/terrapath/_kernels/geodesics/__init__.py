@@ -1,0 +1,1 @@
+"""Kernels of geodesics: the equation, rays, refinement."""

@@ -1,0 +1,302 @@
+"""Newton's method for polylines of least energy: what lies above one, and its step.
+
+The energy of a polyline is its number of pieces times the sum of its squared chords in R^n,
+each times the mean of the squared cost C = c^2 at its ends. Least energy makes the pieces equally
+long and their sum, whose square the energy then is, least.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler import inner_kernel, kernel
+from ..surface.surfaces import jet_at, log_cost_at, put_jet
+
+
+class Block(NamedTuple):
+    """A 2 x 2 matrix."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+
+
+@inner_kernel
+def product(m, k):
+    return Block(
+        m.a * k.a + m.b * k.c,
+        m.a * k.b + m.b * k.d,
+        m.c * k.a + m.d * k.c,
+        m.c * k.b + m.d * k.d,
+    )
+
+
+@inner_kernel
+def transposed(m):
+    return Block(m.a, m.c, m.b, m.d)
+
+
+@inner_kernel
+def inverse(m):
+    det = m.a * m.d - m.b * m.c
+    return Block(m.d / det, -m.b / det, -m.c / det, m.a / det)
+
+
+@inner_kernel
+def entry(blocks, i):
+    """Block i of an array (m, 2, 2)."""
+    return Block(blocks[i, 0, 0], blocks[i, 0, 1], blocks[i, 1, 0], blocks[i, 1, 1])
+
+
+class Strand(NamedTuple):
+    """A polyline (m,), and what lies above it. Its inner points are counted from 0, too."""
+
+    points: np.ndarray  # (m, 2), map units
+    weights: np.ndarray  # (layers,)
+    jets: np.ndarray  # (m, layers, 6): value, gradient and second derivatives of each layer
+    costs: np.ndarray  # (m, 6): the jet of C
+    chords: np.ndarray  # (m - 1, 2 + layers): the pieces in R^n
+    stiffness: np.ndarray  # (m - 1,): the mean of C at the ends of each piece
+    pull: np.ndarray  # (m - 2, 2 + layers): -(C s')' at each inner point
+    drift: np.ndarray  # (m - 2, 2): |s'|^2 / 2 grad C there
+
+
+class Room(NamedTuple):
+    """What a step of Newton's method is worked out in, and what it finds."""
+
+    derivative: np.ndarray  # (m - 2, 2), half the energy's by each inner point
+    move: np.ndarray  # (m - 2, 2), map units
+    pivots: np.ndarray  # (m - 2, 2, 2): the inverses of the diagonal blocks
+    links: np.ndarray  # (m - 2, 2, 2): the blocks above the diagonal
+
+
+@kernel
+def frame_product(strand, i, j):
+    """F_i^T F_j, where F = (I, w grad x_3, ..., w grad x_n)^T maps the plane into R^n."""
+    a, b, c, d = 1.0, 0.0, 0.0, 1.0
+    jets = strand.jets
+    for k in range(strand.weights.shape[0]):
+        w = strand.weights[k] * strand.weights[k]
+        a += w * jets[i, k, 1] * jets[j, k, 1]
+        b += w * jets[i, k, 1] * jets[j, k, 2]
+        c += w * jets[i, k, 2] * jets[j, k, 1]
+        d += w * jets[i, k, 2] * jets[j, k, 2]
+    return Block(a, b, c, d)
+
+
+@inner_kernel
+def seen_from(strand, i, piece):
+    """F_i^T times the chord of a piece."""
+    chord = strand.chords[piece]
+    x, y = chord[0], chord[1]
+    for k in range(strand.weights.shape[0]):
+        rise = strand.weights[k] * chord[k + 2]
+        x += rise * strand.jets[i, k, 1]
+        y += rise * strand.jets[i, k, 2]
+    return x, y
+
+
+@inner_kernel
+def squared_chord(strand, piece):
+    total = 0.0
+    for k in range(strand.chords.shape[1]):
+        total += strand.chords[piece, k] * strand.chords[piece, k]
+    return total
+
+
+@kernel
+def own_block(strand, i, curvature):
+    """Half the energy's second derivative by inner point i.
+
+    Of what the layers and the cost bend, the share ``curvature`` is taken.
+    """
+    at = i + 1
+    m, cost = frame_product(strand, at, at), strand.costs[at]
+    stiffness = strand.stiffness[i] + strand.stiffness[i + 1]
+    a, b, d = stiffness * m.a, stiffness * m.b, stiffness * m.d
+    for k in range(strand.weights.shape[0]):
+        w = curvature * strand.weights[k] * strand.pull[i, k + 2]
+        a += w * strand.jets[at, k, 3]
+        b += w * strand.jets[at, k, 4]
+        d += w * strand.jets[at, k, 5]
+    (ax, ay), (bx, by) = seen_from(strand, at, i), seen_from(strand, at, i + 1)
+    x, y = 0.5 * curvature * (ax - bx), 0.5 * curvature * (ay - by)
+    squares = 0.25 * curvature * (squared_chord(strand, i) + squared_chord(strand, i + 1))
+    a += 2.0 * x * cost[1] + squares * cost[3]
+    b += x * cost[2] + y * cost[1] + squares * cost[4]
+    d += 2.0 * y * cost[2] + squares * cost[5]
+    return Block(a, b, b, d)
+
+
+@kernel
+def link_block(strand, i, curvature):
+    """Half the energy's second derivative by inner points i and i + 1."""
+    at, piece = i + 1, i + 1
+    m, stiffness = frame_product(strand, at, at + 1), strand.stiffness[piece]
+    (ax, ay), (bx, by) = seen_from(strand, at, piece), seen_from(strand, at + 1, piece)
+    half, cost, next_cost = 0.5 * curvature, strand.costs[at], strand.costs[at + 1]
+    return Block(
+        half * (cost[1] * bx - ax * next_cost[1]) - stiffness * m.a,
+        half * (cost[1] * by - ax * next_cost[2]) - stiffness * m.b,
+        half * (cost[2] * bx - ay * next_cost[1]) - stiffness * m.c,
+        half * (cost[2] * by - ay * next_cost[2]) - stiffness * m.d,
+    )
+
+
+@kernel
+def confined(m, projector):
+    """P M P + (I - P): M for the moves that P lets through, the identity for the others."""
+    k = product(product(projector, m), projector)
+    p = projector
+    return Block(k.a + 1.0 - p.a, k.b - p.b, k.c - p.c, k.d + 1.0 - p.d)
+
+
+@kernel
+def fill_derivative(strand, projectors, derivative):
+    """Half the energy's derivative by each inner point, along the moves it is free to make."""
+    jets, weights, pull = strand.jets, strand.weights, strand.pull
+    for i in range(pull.shape[0]):
+        gx, gy = strand.drift[i, 0] + pull[i, 0], strand.drift[i, 1] + pull[i, 1]
+        for k in range(weights.shape[0]):
+            gx += weights[k] * jets[i + 1, k, 1] * pull[i, k + 2]
+            gy += weights[k] * jets[i + 1, k, 2] * pull[i, k + 2]
+        p = entry(projectors, i)
+        derivative[i, 0] = p.a * gx + p.b * gy
+        derivative[i, 1] = p.c * gx + p.d * gy
+
+
+@kernel
+def put(blocks, i, m):
+    blocks[i, 0, 0], blocks[i, 0, 1], blocks[i, 1, 0], blocks[i, 1, 1] = m.a, m.b, m.c, m.d
+
+
+@kernel
+def eliminate(strand, projectors, curvature, pivots, links, step):
+    """Forward elimination of H step = -derivative; ``step`` holds the derivative on entry.
+
+    Returns the row at which H is found not to be positive definite, whose pivot is then left
+    as it is, or the number of rows.
+    """
+    for i in range(step.shape[0]):
+        p = entry(projectors, i)
+        m = confined(own_block(strand, i, curvature), p)
+        gx, gy = -step[i, 0], -step[i, 1]
+        if i > 0:
+            q = product(entry(projectors, i - 1), link_block(strand, i - 1, curvature))
+            put(links, i - 1, product(q, p))
+            left = product(transposed(entry(links, i - 1)), entry(pivots, i - 1))
+            k = product(left, entry(links, i - 1))
+            m = Block(m.a - k.a, m.b - k.b, m.c - k.c, m.d - k.d)
+            gx -= left.a * step[i - 1, 0] + left.b * step[i - 1, 1]
+            gy -= left.c * step[i - 1, 0] + left.d * step[i - 1, 1]
+        if not (m.a > 0.0 and m.a * m.d - m.b * m.c > 1e-14 * m.a * m.d):
+            put(pivots, i, m)
+            return i
+        put(pivots, i, inverse(m))
+        step[i, 0], step[i, 1] = gx, gy
+    return step.shape[0]
+
+
+@kernel
+def substitute(pivots, links, step, rows):
+    """Back substitution from row ``rows`` - 1 upwards; what lies below is taken as it is."""
+    for i in range(rows - 1, -1, -1):
+        gx, gy = step[i, 0], step[i, 1]
+        if i + 1 < step.shape[0]:
+            k = entry(links, i)
+            gx -= k.a * step[i + 1, 0] + k.b * step[i + 1, 1]
+            gy -= k.c * step[i + 1, 0] + k.d * step[i + 1, 1]
+        m = entry(pivots, i)
+        step[i, 0] = m.a * gx + m.b * gy
+        step[i, 1] = m.c * gx + m.d * gy
+
+
+@kernel
+def downward(pivots, links, step, row):
+    """A direction of negative curvature where the elimination broke down at a row.
+
+    v^T H v = u^T M u for the eigenvector u of the pivot M with its least eigenvalue.
+    """
+    m = entry(pivots, row)
+    least = 0.5 * (m.a + m.d) - math.hypot(0.5 * (m.a - m.d), m.b)
+    ux, uy = m.b, least - m.a
+    if abs(least - m.d) > abs(uy):
+        ux, uy = least - m.d, m.b
+    size = math.hypot(ux, uy)
+    for i in range(step.shape[0]):
+        step[i, 0], step[i, 1] = 0.0, 0.0
+    step[row, 0] = ux / size if size > 0.0 else 1.0
+    step[row, 1] = uy / size if size > 0.0 else 0.0
+    substitute(pivots, links, step, row)
+
+
+@kernel
+def newton_step(strand, projectors, curvature, room):
+    """Newton's step for the inner points of a polyline; both ends stay.
+
+    projectors : (m - 2, 2, 2), onto the moves that each point is free to make.
+    curvature : 1 for Newton's step; 0 leaves out what the layers and the cost bend, which
+    makes H positive definite always.
+    Where H is not positive definite, a direction of negative curvature instead. Returns
+    whether it is.
+    """
+    derivative, step = room.derivative, room.move
+    fill_derivative(strand, projectors, derivative)
+    for i in range(step.shape[0]):
+        step[i, 0], step[i, 1] = derivative[i, 0], derivative[i, 1]
+    rows = eliminate(strand, projectors, curvature, room.pivots, room.links, step)
+    if rows < step.shape[0]:
+        downward(room.pivots, room.links, step, rows)
+        return False
+    substitute(room.pivots, room.links, step, rows)
+    return True
+
+
+# What lies above a polyline
+
+
+@inner_kernel
+def put_squared_cost(row, log):
+    """The jet of c^2 = exp(2 log c), from that of log c."""
+    c2, x, y = math.exp(2.0 * log.f), 2.0 * log.fx, 2.0 * log.fy
+    row[0], row[1], row[2] = c2, c2 * x, c2 * y
+    row[3], row[4] = c2 * (2.0 * log.fxx + x * x), c2 * (2.0 * log.fxy + x * y)
+    row[5] = c2 * (2.0 * log.fyy + y * y)
+
+
+@kernel
+def fill_pieces(strand):
+    """What follows from the jets of the points and of the cost there. Returns the energy.
+
+    That is the pieces' number times the sum of squared chords, each times its squared cost.
+    """
+    points, jets, chords, costs = strand.points, strand.jets, strand.chords, strand.costs
+    pieces, energy, squares = chords.shape[0], 0.0, 0.0
+    for m in range(pieces):
+        chords[m, 0] = points[m + 1, 0] - points[m, 0]
+        chords[m, 1] = points[m + 1, 1] - points[m, 1]
+        for k in range(strand.weights.shape[0]):
+            chords[m, k + 2] = strand.weights[k] * (jets[m + 1, k, 0] - jets[m, k, 0])
+        strand.stiffness[m] = 0.5 * (costs[m, 0] + costs[m + 1, 0])
+        squares_before, squares = squares, squared_chord(strand, m)
+        energy += strand.stiffness[m] * squares
+        if m > 0:
+            both = 0.25 * (squares_before + squares)
+            strand.drift[m - 1, 0], strand.drift[m - 1, 1] = both * costs[m, 1], both * costs[m, 2]
+            for k in range(chords.shape[1]):
+                before = strand.stiffness[m - 1] * chords[m - 1, k]
+                strand.pull[m - 1, k] = before - strand.stiffness[m] * chords[m, k]
+    return pieces * energy
+
+
+@kernel
+def lift(surface, strand):
+    """Find what lies above the points of a polyline, and how much energy it has."""
+    for m in range(strand.points.shape[0]):
+        x, y = strand.points[m, 0], strand.points[m, 1]
+        for layer in range(strand.weights.shape[0]):
+            put_jet(strand.jets[m, layer], jet_at(surface, layer, x, y))
+        put_squared_cost(strand.costs[m], log_cost_at(surface, x, y))
+    return fill_pieces(strand)

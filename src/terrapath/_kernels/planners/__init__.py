@@ -1,0 +1,1 @@
+"""Kernels of planners: trees and graph searches."""

@@ -1,0 +1,245 @@
+"""Dijkstra's algorithm and A* over the nodes of a lattice, with edges measured under h.
+
+Start and goal rarely lie on a node: they are two further vertices, joined to the nodes
+nearby. An edge is as long as in the tree planners, max(Line-R, chord). So the chord to the
+goal is a consistent heuristic, and the first way on which a vertex is settled is its shortest.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler import inner_kernel, kernel
+from ..dtypes import record
+from ..space.free_space import segment_is_free
+from .tree import COST, TENSOR, X, Y, chord_between, edge_length, survey
+
+# Places in Graph.counters.
+OPEN = 0  # vertices in the heap
+SETTLED = 1  # vertices whose shortest way is known
+VERTICES = 2  # vertices that an edge was considered to
+CONSIDERED = 3  # edges considered
+PRUNED = 4  # edges that the chord ruled out
+INTEGRATED = 5  # edges measured by Line-R
+CHECKED = 6  # edges tested against obstacles
+COUNTERS = 7
+
+# What a vertex's slot says where it is not in the heap, whose first slot is 1.
+UNSEEN = 0
+DONE = -1
+WITHOUT_WAY = -2
+
+# A vertex: the way to it, its slot of the heap, and the metric tensor. That comes last: to
+# Numba, a tensor with more behind it would be a tensor.
+VERTEX = record(
+    ("parent", np.int32),  # -1 at the start
+    ("slot", np.int32),
+    *TENSOR.descr,
+)
+
+
+# A slot of the heap.
+ENTRY = record(("key", np.float64), ("vertex", np.int32))
+
+
+class Nodes(NamedTuple):
+    """Where the vertices lie, and which are joined: what stays as it is."""
+
+    x: np.ndarray  # (nx,) float64
+    y: np.ndarray  # (ny,) float64
+    offsets: np.ndarray  # (m, 2) int64: columns and rows from a node to its neighbours
+    joins: np.ndarray  # (2, 4) int64: first and last column and row that start, goal are joined to
+
+
+class Graph(NamedTuple):
+    """The nodes row by row, then the start, then the goal. All arrays are filled in place.
+
+    Few arrays, because each costs time wherever they are handed through a call.
+    """
+
+    vertices: np.ndarray  # (nx * ny + 2,) VERTEX, zeros before they are seen
+    places: np.ndarray  # (nx * ny + 2, LIFTED + layers) float64, as a tree's
+    heap: np.ndarray  # (nx * ny + 3,) ENTRY: the open vertices, four children a slot, from slot 1
+    counters: np.ndarray  # (COUNTERS,) int64
+    floor: float  # no cost of the surface is below it
+
+
+class Options(NamedTuple):
+    """What the planner was asked for."""
+
+    panel: float  # longest stretch that one application of Line-R measures
+    informed: bool  # A*: ordered by cost plus chord to the goal; otherwise by cost alone
+    direct: bool  # the start is joined to the goal
+
+
+# The heap
+
+
+@kernel
+def raise_to(vertices, heap, slot, vertex, key):
+    """Put a vertex into an empty slot of the heap, or above it where its key says so."""
+    while slot > 1:
+        above = (slot + 2) // 4
+        if heap[above].key <= key:
+            break
+        heap[slot] = heap[above]
+        vertices[heap[slot].vertex].slot = slot
+        slot = above
+    heap[slot].key = key
+    heap[slot].vertex = vertex
+    vertices[vertex].slot = slot
+
+
+@kernel
+def empty_slot_below(vertices, heap, slot, key, last):
+    """Move children with lesser keys up into an empty slot; return the slot left empty."""
+    while True:
+        first = 4 * slot - 2
+        least = slot
+        below = key
+        for child in range(first, min(first + 3, last) + 1):
+            if heap[child].key < below:
+                least, below = child, heap[child].key
+        if least == slot:
+            return slot
+        heap[slot] = heap[least]
+        vertices[heap[slot].vertex].slot = slot
+        slot = least
+
+
+@kernel
+def take_first(vertices, heap, last):
+    """Take the vertex with the least key from a heap that is filled up to the slot ``last``."""
+    first, vertex, key = int(heap[1].vertex), int(heap[last].vertex), heap[last].key
+    slot = empty_slot_below(vertices, heap, 1, key, last - 1)
+    raise_to(vertices, heap, slot, vertex, key)
+    vertices[first].slot = DONE
+    return first
+
+
+# The search
+
+
+@kernel
+def place(surface, graph, v, x, y):
+    """Write a vertex's position and what is cached with it; no way leads there yet."""
+    survey(surface, graph, v, x, y)
+    graph.places[v, COST] = math.inf
+    vertex = graph.vertices[v]
+    vertex.parent = -1
+    vertex.slot = WITHOUT_WAY
+    graph.counters[VERTICES] += 1
+
+
+@kernel
+def discover(surface, nodes, graph, node):
+    """Place a node that an edge leads to for the first time."""
+    columns = nodes.x.shape[0]
+    place(surface, graph, node, nodes.x[node % columns], nodes.y[node // columns])
+
+
+@kernel
+def enter(graph, options, v):
+    """Put a vertex where its cost belongs in the heap."""
+    key = graph.places[v, COST]
+    if options.informed:
+        key += chord_between(graph, v, graph.vertices.shape[0] - 1)
+    slot = graph.vertices[v].slot
+    if slot == WITHOUT_WAY:
+        graph.counters[OPEN] += 1
+        slot = graph.counters[OPEN]
+    raise_to(graph.vertices, graph.heap, slot, v, key)
+
+
+@kernel
+def measure(surface, space, graph, options, u, v, chord):
+    """Measure the edge u-v, and let the way to v go through it where that is shorter."""
+    origin, place = graph.places[u], graph.places[v]
+    graph.counters[INTEGRATED] += 1
+    length = max(edge_length(surface, graph, u, v, options.panel), chord)
+    if not origin[COST] + length < place[COST]:
+        return
+    graph.counters[CHECKED] += 1
+    if segment_is_free(space, origin[X], origin[Y], place[X], place[Y]):
+        place[COST] = origin[COST] + length
+        graph.vertices[v].parent = u
+        enter(graph, options, v)
+
+
+@inner_kernel
+def relax(surface, space, nodes, graph, options, u, v):
+    """Let the way to v go through u where that is shorter.
+
+    An edge whose cost-to-come plus chord cannot win is never integrated.
+    """
+    if graph.vertices[v].slot != DONE:
+        if graph.vertices[v].slot == UNSEEN:
+            discover(surface, nodes, graph, v)
+        graph.counters[CONSIDERED] += 1
+        chord = chord_between(graph, u, v)
+        if graph.places[u, COST] + chord < graph.places[v, COST]:
+            measure(surface, space, graph, options, u, v, chord)
+        else:
+            graph.counters[PRUNED] += 1
+
+
+@kernel
+def relax_around_start(surface, space, nodes, graph, options, start):
+    """Relax the edges of the start: to the nodes that it is joined to."""
+    box = nodes.joins[0]
+    for row in range(box[2], box[3] + 1):
+        for column in range(box[0], box[1] + 1):
+            relax(surface, space, nodes, graph, options, start, row * nodes.x.shape[0] + column)
+    if options.direct:
+        relax(surface, space, nodes, graph, options, start, start + 1)
+
+
+@kernel
+def relax_around_node(surface, space, nodes, graph, options, u, goal):
+    """Relax the edges of a node: to its neighbours, and to the goal where it is joined to it."""
+    columns, rows = nodes.x.shape[0], nodes.y.shape[0]
+    column, row = u % columns, u // columns
+    for k in range(nodes.offsets.shape[0]):
+        i, j = column + nodes.offsets[k, 0], row + nodes.offsets[k, 1]
+        if 0 <= i < columns and 0 <= j < rows:
+            relax(surface, space, nodes, graph, options, u, j * columns + i)
+    box = nodes.joins[1]
+    if box[0] <= column <= box[1] and box[2] <= row <= box[3]:
+        relax(surface, space, nodes, graph, options, u, goal)
+
+
+@kernel
+def search(surface, space, nodes, graph, options, most):
+    """Settle up to ``most`` vertices; end early where the goal is, or nothing is left."""
+    goal = graph.vertices.shape[0] - 1
+    for _ in range(most):
+        if graph.counters[OPEN] == 0 or graph.vertices[goal].slot == DONE:
+            return
+        u = take_first(graph.vertices, graph.heap, graph.counters[OPEN])
+        graph.counters[OPEN] -= 1
+        graph.counters[SETTLED] += 1
+        if u == goal - 1:
+            relax_around_start(surface, space, nodes, graph, options, u)
+        elif u != goal:
+            relax_around_node(surface, space, nodes, graph, options, u, goal)
+
+
+@kernel
+def begin(surface, graph, options, start_x, start_y, goal_x, goal_y):
+    """Open the start."""
+    goal = graph.vertices.shape[0] - 1
+    place(surface, graph, goal, goal_x, goal_y)
+    place(surface, graph, goal - 1, start_x, start_y)
+    graph.places[goal - 1, COST] = 0.0
+    enter(graph, options, goal - 1)
+
+
+@kernel
+def any_node_is_near(space, nodes, box, x, y):
+    """Does a free segment lead from (x, y) to a node of the box?"""
+    for row in range(box[2], box[3] + 1):
+        for column in range(box[0], box[1] + 1):
+            if segment_is_free(space, x, y, nodes.x[column], nodes.y[row]):
+                return True
+    return False

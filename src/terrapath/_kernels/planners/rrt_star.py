@@ -1,0 +1,299 @@
+"""The tree of RRT*-R: Algorithms 1 to 3 of the paper, with edges pruned by the chord.
+
+What the paper leaves open, and what is done here: Algorithm 3 as printed never updates
+Cost(v_new) after it changes v_min; that update is meant, and made. The goal joins the
+tree as a vertex as soon as one extension can reach it, and from then on is rewired like
+any other. An edge is as long as Line-R says but never shorter than its chord: both
+estimate its true length, and the chord is never above it. An informed tree tries the straight
+way to the goal first, and hangs new vertices below their parents' parents where that is shorter.
+"""
+
+import math
+
+from ..compiler import inner_kernel, kernel
+from ..space.free_space import segment_is_free
+from .buckets import lay_out, nearest, put, resize, squared_distance, within
+from .sampling import distance_to_goal, near_radius, sample
+from .tree import (
+    CHECKED,
+    CONSIDERED,
+    COST,
+    GOAL,
+    INTEGRATED,
+    LAID_OUT,
+    PRUNED,
+    REWIRED,
+    SAMPLES,
+    STRAIGHT,
+    VERTICES,
+    X,
+    Y,
+    adopt,
+    edge_length,
+    pass_on_cost,
+    place,
+    plant,
+    release,
+    renumber,
+    squared_rise,
+)
+
+# Measuring edges
+
+
+@inner_kernel
+def candidate_length(surface, tree, options, new, k):
+    """Length of the k-th candidate edge as the planner believes it, measured at most once."""
+    candidate = tree.near[k]
+    if candidate.length < 0.0:
+        candidate.length = candidate.chord
+        if options.riemannian:
+            tree.counters[INTEGRATED] += 1
+            line_r = edge_length(surface, tree, new, candidate.vertex, options.panel)
+            candidate.length = max(line_r, candidate.chord)
+    return candidate.length
+
+
+@inner_kernel
+def candidate_is_free(space, tree, new, k):
+    """Does the k-th candidate edge stay in free space? Tested at most once."""
+    candidate = tree.near[k]
+    if candidate.free < 0:
+        tree.counters[CHECKED] += 1
+        p, q = tree.places[new], tree.places[candidate.vertex]
+        candidate.free = segment_is_free(space, p[X], p[Y], q[X], q[Y])
+    return candidate.free == 1
+
+
+# Growing the tree
+
+# Side of a bucket, in near radii.
+SIDE = 0.35
+
+
+@inner_kernel
+def nearest_of(tree, count):
+    """The place among the candidates of the nearest vertex, the first of several."""
+    best = 0
+    for k in range(1, count):
+        squared, least = tree.near[k].squared, tree.near[best].squared
+        is_first = tree.near[k].vertex < tree.near[best].vertex
+        if squared < least or (squared == least and is_first):
+            best = k
+    return best
+
+
+@kernel
+def steer(tree, options, x, y):
+    """The nearest vertex, and the point at most a step from it towards (x, y)."""
+    origin = nearest(tree.buckets, tree.places, x, y)
+    ox, oy = tree.places[origin, X], tree.places[origin, Y]
+    distance = math.hypot(x - ox, y - oy)
+    if distance > options.step:
+        x = min(max(ox + (x - ox) * (options.step / distance), options.x0), options.x1)
+        y = min(max(oy + (y - oy) * (options.step / distance), options.y0), options.y1)
+    return origin, x, y
+
+
+@kernel
+def find_near(tree, options, radius, x, y):
+    """Collect the vertices near the new point; return where it lies, their count, the nearest.
+
+    Where there are any within the radius, which is at most a step, the nearest is one of
+    them. Elsewhere the tree is steered from the nearest vertex, which is always a candidate.
+    """
+    count = within(tree.buckets, tree.places, x, y, radius, tree.near)
+    if count > 0:
+        return x, y, count, nearest_of(tree, count)
+    origin, x, y = steer(tree, options, x, y)
+    count = within(tree.buckets, tree.places, x, y, radius, tree.near)
+    for k in range(count):
+        if tree.near[k].vertex == origin:
+            return x, y, count, k
+    tree.near[count].vertex = origin
+    tree.near[count].squared = squared_distance(tree.places, origin, x, y)
+    return x, y, count + 1, count
+
+
+@inner_kernel
+def measure_chord(tree, new, k):
+    """Lay out the k-th candidate's chord and cost; return their sum.
+
+    No way through it to the new vertex is shorter.
+    """
+    candidate = tree.near[k]
+    rise = squared_rise(tree, new, candidate.vertex)
+    candidate.chord = tree.floor * math.sqrt(candidate.squared + rise)
+    candidate.cost = tree.places[candidate.vertex, COST]
+    candidate.length = -1.0
+    candidate.free = -1
+    return candidate.cost + candidate.chord
+
+
+@kernel
+def measure_chords(tree, new, count):
+    """Lay out the candidates' chords and costs; return the most promising one.
+
+    That is the one whose cost plus chord is least.
+    """
+    promising = -1
+    least = math.inf
+    for k in range(count):
+        bound = measure_chord(tree, new, k)
+        if bound < least:
+            promising, least = k, bound
+    return promising
+
+
+@kernel
+def choose_parent(surface, space, tree, options, new, count, promising):
+    """Hang the new vertex below the candidate through which it is cheapest to reach.
+
+    False where no candidate's length is finite, as on ground too steep for floating point.
+
+    The most promising candidate is tried first. An edge whose cost-to-come plus chord
+    cannot win is never integrated, and since no edge is shorter than its chord, that
+    changes nothing but the time taken.
+    """
+    best, pruned = -1, 0
+    least = math.inf
+    for turn in range(-1, count):
+        k = promising if turn == -1 else turn
+        if turn == promising:
+            continue
+        come = tree.near[k].cost
+        if options.prune and come + tree.near[k].chord >= least:
+            pruned += 1
+            continue
+        length = candidate_length(surface, tree, options, new, k)
+        if come + length < least and candidate_is_free(space, tree, new, k):
+            best, least = k, come + length
+    tree.counters[PRUNED] += pruned
+    if best < 0:
+        return False
+    adopt(tree, tree.near[best].vertex, new, tree.near[best].length)
+    return True
+
+
+@kernel
+def is_shorter(surface, space, tree, options, new, ancestor, spare):
+    """Is the new vertex cheaper to reach straight from an ancestor, at most a step away?"""
+    candidate, p = tree.near[spare], tree.places[new]
+    candidate.vertex = ancestor
+    candidate.squared = squared_distance(tree.places, ancestor, p[X], p[Y])
+    if candidate.squared > options.step * options.step:
+        return False
+    bound, least = measure_chord(tree, new, spare), p[COST]
+    tree.counters[CONSIDERED] += 1
+    if options.prune and bound >= least:
+        tree.counters[PRUNED] += 1
+        return False
+    length = candidate_length(surface, tree, options, new, spare)
+    return candidate.cost + length < least and candidate_is_free(space, tree, new, spare)
+
+
+@kernel
+def skip_parents(surface, space, tree, options, new, spare):
+    """Hang the new vertex below its parent's parent, and so on, as long as that is shorter.
+
+    So paths have few bends already where the tree is thin (Jeong, Lee and Kim 2019).
+    spare : a place among the candidates that none takes.
+    """
+    ancestor = tree.links[tree.links[new].parent].parent
+    while ancestor >= 0 and is_shorter(surface, space, tree, options, new, ancestor, spare):
+        release(tree.links, new)
+        adopt(tree, ancestor, new, tree.near[spare].length)
+        ancestor = tree.links[ancestor].parent
+
+
+@kernel
+def rewire(surface, space, tree, options, new, count):
+    """Hang candidates below the new vertex where that shortens their way.
+
+    Costs are compared as they were before this extension, Cost in the graph G of Algorithm 3.
+    Rewiring one candidate can shorten the way to another; looking at that would let the order
+    in which the candidates are visited decide the tree.
+    """
+    come, parent = tree.places[new, COST], tree.links[new].parent
+    rewired, pruned = 0, 0
+    for k in range(count):
+        near = tree.near[k].vertex
+        if near == parent:
+            continue
+        if options.prune and come + tree.near[k].chord >= tree.near[k].cost:
+            pruned += 1
+            continue
+        length = candidate_length(surface, tree, options, new, k)
+        if come + length < tree.near[k].cost and candidate_is_free(space, tree, new, k):
+            release(tree.links, near)
+            adopt(tree, new, near, length)
+            tree.queue[rewired] = near
+            rewired += 1
+    pass_on_cost(tree, rewired)
+    tree.counters[REWIRED] += rewired
+    tree.counters[PRUNED] += pruned
+
+
+@kernel
+def refresh_buckets(tree, options, radius):
+    """Lay buckets and vertices out anew each time the tree has grown by half."""
+    count = tree.counters[VERTICES]
+    if 2 * count >= 3 * tree.counters[LAID_OUT]:
+        width, height = options.x1 - options.x0, options.y1 - options.y0
+        resize(tree.buckets, width, height, SIDE * radius)
+        lay_out(tree.buckets, tree.places, count, tree.queue)
+        renumber(tree, count, tree.queue)
+        tree.counters[LAID_OUT] = count
+
+
+@kernel
+def extend(surface, space, tree, options, x, y):
+    """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew."""
+    new = tree.counters[VERTICES]
+    radius = near_radius(tree, options)
+    refresh_buckets(tree, options, radius)
+    x, y, count, closest = find_near(tree, options, radius, x, y)
+    if tree.near[closest].squared == 0.0:
+        return False
+    place(surface, tree, new, x, y)
+    promising = measure_chords(tree, new, count)
+    if promising < 0 or not candidate_is_free(space, tree, new, closest):
+        return False
+    tree.counters[CONSIDERED] += 2 * count - 1
+    if not choose_parent(surface, space, tree, options, new, count, promising):
+        return False
+    if options.informed:
+        skip_parents(surface, space, tree, options, new, count)
+    rewire(surface, space, tree, options, new, count)
+    put(tree.buckets, tree.places, new)
+    tree.counters[VERTICES] = new + 1
+    return True
+
+
+@kernel
+def join_goal(surface, space, tree, options):
+    """Make the goal a vertex where the newest vertex is one step away from it, or is it."""
+    newest = tree.counters[VERTICES] - 1
+    if 0.0 < distance_to_goal(tree, options, newest) <= options.step:
+        extend(surface, space, tree, options, options.goal_x, options.goal_y)
+        newest = tree.counters[VERTICES] - 1
+    if distance_to_goal(tree, options, newest) == 0.0:
+        tree.counters[GOAL] = newest
+
+
+@kernel
+def grow(surface, space, tree, options, draws):
+    """Algorithm 2: draw len(draws) samples. draws (m, 3): uniform numbers in [0, 1).
+
+    The first call plants the tree.
+    """
+    if tree.counters[VERTICES] == 0:
+        plant(surface, tree, options)
+    for m in range(draws.shape[0]):
+        tree.counters[SAMPLES] += 1
+        x, y, worthwhile = sample(surface, tree, options, draws[m])
+        grew = worthwhile and extend(surface, space, tree, options, x, y)
+        if not grew:
+            tree.counters[STRAIGHT] = 0
+        elif tree.counters[GOAL] < 0:
+            join_goal(surface, space, tree, options)

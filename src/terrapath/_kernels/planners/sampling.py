@@ -1,0 +1,127 @@
+"""Where the next sample is drawn: everywhere, at the goal, or where better paths can be."""
+
+import math
+
+from ..compiler import inner_kernel, kernel
+from ..surface.surfaces import spot_at, value_at
+from .buckets import squared_distance
+from .tree import COST, GOAL, LIFTED, STRAIGHT, VERTICES, X, Y
+
+# Share of the samples of an informed tree that are drawn beside the best path. With half of
+# them the tree is too thin elsewhere, and too often keeps to the valley that it found first.
+PATH_SHARE = 0.3
+
+
+@inner_kernel
+def distance_to_goal(tree, options, vertex):
+    """Planar distance."""
+    return math.hypot(
+        tree.places[vertex, X] - options.goal_x, tree.places[vertex, Y] - options.goal_y
+    )
+
+
+@inner_kernel
+def area_to_search(tree, options):
+    """The bounds' area, or that of the ellipse which holds all better paths if it is smaller.
+
+    A path of length c stays where the planar distances to start and goal, which are at
+    most the chords, sum to at most c over the least cost.
+    """
+    area = (options.x1 - options.x0) * (options.y1 - options.y0)
+    if options.informed and tree.counters[GOAL] >= 0:
+        longest = tree.places[tree.counters[GOAL], COST] / tree.floor
+        focal = distance_to_goal(tree, options, 0)
+        area = min(area, 0.25 * math.pi * longest * math.sqrt(max(longest**2 - focal**2, 0.0)))
+    return area
+
+
+@inner_kernel
+def near_radius(tree, options):
+    """min(step, radius * sqrt(area * log n / n)) (Karaman and Frazzoli 2011, d = 2)."""
+    n = max(tree.counters[VERTICES], 2)
+    area = area_to_search(tree, options)
+    return min(options.step, options.radius * math.sqrt(area * math.log(n) / n))
+
+
+@inner_kernel
+def is_within_bounds(options, x, y):
+    """Is (x, y) in the region? Not where it is no number."""
+    return options.x0 <= x <= options.x1 and options.y0 <= y <= options.y1
+
+
+@kernel
+def can_improve(surface, tree, x, y):
+    """Could a path through (x, y) beat the best one? By the chord bound, in R^n."""
+    goal = tree.counters[GOAL]
+    from_start = squared_distance(tree.places, 0, x, y)
+    to_goal = squared_distance(tree.places, goal, x, y)
+    longest = tree.places[goal, COST] / tree.floor
+    if math.sqrt(from_start) + math.sqrt(to_goal) >= longest:
+        return False
+    spot = spot_at(surface, x, y)
+    for layer in range(surface.weights.shape[0]):
+        z = surface.weights[layer] * value_at(surface, layer, spot)
+        from_start += (z - tree.places[0, LIFTED + layer]) ** 2
+        to_goal += (z - tree.places[goal, LIFTED + layer]) ** 2
+    return math.sqrt(from_start) + math.sqrt(to_goal) < longest
+
+
+@inner_kernel
+def point_of_ellipse(tree, options, u, v):
+    """The point of the ellipse of better paths for (u, v) in the unit square, uniformly."""
+    longest = tree.places[tree.counters[GOAL], COST] / tree.floor
+    ax, ay = tree.places[0, X], tree.places[0, Y]
+    focal = distance_to_goal(tree, options, 0)
+    width = math.sqrt(max(longest**2 - focal**2, 0.0))
+    along = 0.5 * longest * math.sqrt(u) * math.cos(2.0 * math.pi * v)
+    across = 0.5 * width * math.sqrt(u) * math.sin(2.0 * math.pi * v)
+    ex, ey = (options.goal_x - ax) / focal, (options.goal_y - ay) / focal
+    x = 0.5 * (ax + options.goal_x) + along * ex - across * ey
+    y = 0.5 * (ay + options.goal_y) + along * ey + across * ex
+    return x, y
+
+
+@inner_kernel
+def point_by_path(tree, options, share, offset):
+    """A point beside where the best path has run that share of its length, straight across it.
+
+    It is at most a near radius away, for an offset from -1 to 1, with distances spread over
+    all scales: half of them are less than a 32nd of the radius.
+    """
+    vertex = tree.counters[GOAL]
+    run = share * tree.places[vertex, COST]
+    parent = tree.links[vertex].parent
+    while tree.places[parent, COST] > run:
+        vertex = parent
+        parent = tree.links[vertex].parent
+    p, q = tree.places[parent], tree.places[vertex]
+    along = (run - p[COST]) / (q[COST] - p[COST])
+    dx, dy = q[X] - p[X], q[Y] - p[Y]
+    across = near_radius(tree, options) * offset**5 / math.hypot(dx, dy)
+    return p[X] + along * dx - across * dy, p[Y] + along * dy + across * dx
+
+
+@kernel
+def sample(surface, tree, options, draw):
+    """A point to extend towards, and whether it is worth it.
+
+    draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share
+    ``goal_bias`` of the samples is the goal, and of an informed tree as many of the first as
+    bring it straight towards the goal. From then on, informed samples come from beside
+    the best path (Akgun and Stilman 2011), a share of them, and from the ellipse that holds
+    all better ones; those that the chord rules out are dropped (Gammell, Srinivasa and
+    Barfoot 2014, with the chord in place of the distance).
+    """
+    width, height = options.x1 - options.x0, options.y1 - options.y0
+    x, y = options.x0 + draw[1] * width, options.y0 + draw[2] * height
+    if tree.counters[GOAL] < 0:
+        if tree.counters[STRAIGHT] or draw[0] < options.goal_bias:
+            x, y = options.goal_x, options.goal_y
+        return x, y, True
+    if not options.informed:
+        return x, y, True
+    if draw[0] < PATH_SHARE:
+        x, y = point_by_path(tree, options, draw[1], 2.0 * draw[2] - 1.0)
+    elif area_to_search(tree, options) < width * height:
+        x, y = point_of_ellipse(tree, options, draw[1], draw[2])
+    return x, y, is_within_bounds(options, x, y) and can_improve(surface, tree, x, y)

@@ -1,0 +1,245 @@
+"""The tree that sampling planners grow: vertices in records, children in linked lists."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler import inner_kernel, kernel
+from ..dtypes import record
+from ..surface.lengths import composite_boole, norm
+from ..surface.surfaces import Metric, plus_layer, slope_at, spot_at, times_cost
+from .buckets import Buckets
+
+# Places in Tree.counters.
+VERTICES = 0  # vertices in the tree
+GOAL = 1  # the goal's vertex, -1 until it is in the tree
+SAMPLES = 2  # samples drawn
+CONSIDERED = 3  # edges considered
+PRUNED = 4  # edges that the chord ruled out
+INTEGRATED = 5  # edges measured by Line-R
+CHECKED = 6  # edges tested against obstacles
+REWIRED = 7  # edges replaced by a better one
+LAID_OUT = 8  # vertices when the buckets were last laid out
+STRAIGHT = 9  # 1 as long as the tree is growing straight from the start to the goal
+COUNTERS = 10
+
+
+# Entries of a row of Tree.places: all that the search for neighbours reads of a vertex.
+X, Y = 0, 1
+COST = 2  # length from the start
+LIFTED = 3  # the first of the weighted layer values
+
+# The metric tensor at a vertex: what is read of it where an edge is measured.
+TENSOR = record(*((name, np.float64) for name in ("h11", "h12", "h22")))
+
+# How a vertex hangs in the tree. Costs are passed on over many, so they lie close together.
+LINK = record(
+    ("edge", np.float64),  # length of the edge from the parent
+    ("parent", np.int32),  # -1 at the start
+    ("child", np.int32),  # first child, -1 where none
+    ("sibling", np.int32),  # next child of the same parent
+    ("age", np.int32),  # how many vertices there were before it
+)
+
+# A candidate edge between the newest vertex and one near it.
+CANDIDATE = record(
+    ("squared", np.float64),  # planar distance squared
+    ("chord", np.float64),
+    ("cost", np.float64),  # of the other vertex, before this extension
+    ("length", np.float64),  # negative where not yet measured
+    ("vertex", np.int32),
+    ("free", np.int32),  # 1 free, 0 blocked, -1 not yet tested
+)
+
+
+class Tree(NamedTuple):
+    """The tree and its workspace; all arrays are filled in place.
+
+    Vertices are numbered anew each time the buckets are laid out, but the start is always 0.
+    """
+
+    places: np.ndarray  # (n, LIFTED + layers) float64: rows of X, Y, COST and LIFTED
+    vertices: np.ndarray  # (n,) TENSOR
+    links: np.ndarray  # (n,) LINK
+    counters: np.ndarray  # (COUNTERS,) int64, 0 before the tree is planted
+    buckets: Buckets
+    floor: float  # no cost of the surface is below it
+    near: np.ndarray  # (n,) CANDIDATE: workspace
+    queue: np.ndarray  # (n,) int32: workspace
+
+
+class Options(NamedTuple):
+    """What the planner was asked for."""
+
+    x0: float  # bounds
+    y0: float
+    x1: float
+    y1: float
+    start_x: float
+    start_y: float
+    goal_x: float
+    goal_y: float
+    step: float
+    radius: float  # the near radius is radius * sqrt(area * log(n) / n), at most the step
+    goal_bias: float
+    panel: float  # longest stretch that one application of the rule measures
+    riemannian: bool  # edges measured by Line-R; otherwise by the chord
+    prune: bool
+    informed: bool
+
+
+@inner_kernel
+def chord_between(graph, a, b):
+    """Chord between two vertices of any graph with ``places``, times the least cost."""
+    p, q = graph.places[a], graph.places[b]
+    dx, dy = p[X] - q[X], p[Y] - q[Y]
+    return graph.floor * math.sqrt(dx * dx + dy * dy + squared_rise(graph, a, b))
+
+
+@inner_kernel
+def squared_rise(graph, a, b):
+    """How far the layers rise between two vertices, squared and summed."""
+    total = 0.0
+    for entry in range(LIFTED, graph.places.shape[1]):
+        rise = graph.places[a, entry] - graph.places[b, entry]
+        total += rise * rise
+    return total
+
+
+@inner_kernel
+def survey(surface, graph, new, x, y):
+    """Write a vertex's position and the surface above it; any graph's with ``places``."""
+    place, vertex = graph.places[new], graph.vertices[new]
+    place[X], place[Y] = x, y
+    spot, h = spot_at(surface, x, y), Metric(1.0, 0.0, 1.0)
+    for layer in range(surface.weights.shape[0]):
+        slope = slope_at(surface, layer, spot)
+        place[LIFTED + layer] = surface.weights[layer] * slope.f
+        h = plus_layer(h, surface.weights[layer], slope)
+    h = times_cost(surface, spot, h)
+    vertex.h11 = h.h11
+    vertex.h12 = h.h12
+    vertex.h22 = h.h22
+
+
+@kernel
+def edge_length(surface, graph, a, b, panel):
+    """Length of the edge between two vertices by Line-R, in panels."""
+    p, q = graph.places[a], graph.places[b]
+    dx, dy = q[X] - p[X], q[Y] - p[Y]
+    panels = max(math.ceil(math.sqrt(dx * dx + dy * dy) / panel), 1)
+    dx, dy = dx / panels, dy / panels
+    ends = norm(graph.vertices[a], dx, dy) + norm(graph.vertices[b], dx, dy)
+    return composite_boole(surface, p[X], p[Y], dx, dy, ends, panels)
+
+
+@kernel
+def place(surface, tree, new, x, y):
+    """Write a vertex's position and what is cached with it; it is not yet in the tree."""
+    survey(surface, tree, new, x, y)
+    tree.links[new].child = -1
+    tree.links[new].age = new
+
+
+@kernel
+def plant(surface, tree, options):
+    """Make the start the tree's first vertex."""
+    place(surface, tree, 0, options.start_x, options.start_y)
+    tree.places[0, COST] = 0.0
+    root = tree.links[0]
+    root.edge = 0.0
+    root.parent = -1
+    root.sibling = -1
+    tree.buckets.frame[0] = options.x0
+    tree.buckets.frame[1] = options.y0
+    tree.counters[GOAL] = -1
+    tree.counters[VERTICES] = 1
+    tree.counters[STRAIGHT] = options.informed
+
+
+@kernel
+def adopt(tree, parent, child, edge):
+    """Hang a vertex below a parent."""
+    link = tree.links[child]
+    link.parent = parent
+    link.edge = edge
+    link.sibling = tree.links[parent].child
+    tree.links[parent].child = child
+    tree.places[child, COST] = tree.places[parent, COST] + edge
+
+
+@kernel
+def release(links, child):
+    """Take a vertex from its parent's children."""
+    parent = links[links[child].parent]
+    if parent.child == child:
+        parent.child = links[child].sibling
+        return
+    elder = parent.child
+    while links[elder].sibling != child:
+        elder = links[elder].sibling
+    links[elder].sibling = links[child].sibling
+
+
+@kernel
+def pass_on_cost(tree, count):
+    """Recompute the cost of everything below the first vertices of ``Tree.queue``.
+
+    In a queue: vertices that follow each other hang on different ones, and the processor
+    fetches several at once. From a stack each would be waited for.
+    """
+    done = 0
+    while done < count:
+        parent = tree.queue[done]
+        done += 1
+        cost = tree.places[parent, COST]
+        child = tree.links[parent].child
+        while child >= 0:
+            tree.places[child, COST] = cost + tree.links[child].edge
+            tree.queue[count] = child
+            count += 1
+            child = tree.links[child].sibling
+
+
+# Vertices that lie near one another are looked at together. In the order in which they came
+# they would be strewn over the memory, and most of the time would go by waiting for them.
+
+
+@inner_kernel
+def renamed(numbers, vertex):
+    return numbers[vertex] if vertex >= 0 else vertex
+
+
+@inner_kernel
+def swap_records(records, p, q, spare):
+    records[spare] = records[p]
+    records[p] = records[q]
+    records[q] = records[spare]
+
+
+@inner_kernel
+def swap(tree, p, q, spare):
+    """Swap two vertices, by way of a spare one."""
+    swap_records(tree.vertices, p, q, spare)
+    swap_records(tree.links, p, q, spare)
+    for entry in range(tree.places.shape[1]):
+        number = tree.places[p, entry]
+        tree.places[p, entry] = tree.places[q, entry]
+        tree.places[q, entry] = number
+
+
+@kernel
+def renumber(tree, count, numbers):
+    """Give each of the first vertices its number in ``numbers`` (count,), which is used up."""
+    for p in range(count):
+        link = tree.links[p]
+        link.parent = renamed(numbers, link.parent)
+        link.child = renamed(numbers, link.child)
+        link.sibling = renamed(numbers, link.sibling)
+    tree.counters[GOAL] = renamed(numbers, tree.counters[GOAL])
+    for p in range(count):
+        while numbers[p] != p:
+            q = numbers[p]
+            swap(tree, p, q, count)
+            numbers[p], numbers[q] = numbers[q], q

@@ -1,0 +1,1 @@
+"""Kernels of surfaces: splines, the metric, lengths."""

@@ -1,0 +1,142 @@
+"""The metric h at all nodes of a lattice, row by row.
+
+Both surface classes are separable: what depends on x1 alone is computed once for all rows,
+what depends on x2 alone once a row.
+"""
+
+import math
+
+import numpy as np
+
+from ..compiler import allocating_kernel, kernel
+from ..dispatch import per_class
+from .bsplines import basis, basis_slope
+from .surfaces import Peaks, Spline, spline_cell
+
+# Places in the rows that are filled in.
+H11, H12, H22, FX, FY = 0, 1, 2, 3, 4
+ROWS = 5
+
+
+@allocating_kernel
+def peaks_columns(surface, grid):
+    """(2 p, nx): a f exp(-f d^2) of each peak, d being the distance along x1, and d times it."""
+    columns = np.empty((2 * surface.peaks.shape[0], grid.nx))
+    for p in range(surface.peaks.shape[0]):
+        amplitude, falloff, centre = surface.peaks[p, 0], surface.peaks[p, 1], surface.peaks[p, 2]
+        for i in range(grid.nx):
+            d = grid.x0 + i * grid.dx - centre
+            share = amplitude * falloff * math.exp(-falloff * d * d)
+            columns[2 * p, i] = share
+            columns[2 * p + 1, i] = share * d
+    return columns
+
+
+@kernel
+def add_peak(fx, fy, along, across, sx, sy):
+    """Add a peak's slopes to those of a row."""
+    for i in range(fx.shape[0]):
+        fx[i] += sx * across[i]
+        fy[i] += sy * along[i]
+
+
+@kernel
+def add_layer(row, w):
+    """Add a layer's slopes to the metric of a row, weighted."""
+    h11, h12, h22, fx, fy = row[H11], row[H12], row[H22], row[FX], row[FY]
+    for i in range(fx.shape[0]):
+        h11[i] += w * fx[i] * fx[i]
+        h12[i] += w * fx[i] * fy[i]
+        h22[i] += w * fy[i] * fy[i]
+
+
+@kernel
+def fill_peaks_row(surface, grid, j, columns, row):
+    y = grid.y0 + j * grid.dy
+    row[H11], row[H12], row[H22] = 1.0, 0.0, 1.0
+    for layer in range(surface.weights.shape[0]):
+        row[FX], row[FY] = 0.0, 0.0
+        for p in range(surface.first[layer], surface.first[layer + 1]):
+            d = y - surface.peaks[p, 3]
+            share = -2.0 * math.exp(-surface.peaks[p, 1] * d * d)
+            add_peak(row[FX], row[FY], columns[2 * p], columns[2 * p + 1], share, share * d)
+        add_layer(row, surface.weights[layer] * surface.weights[layer])
+
+
+@allocating_kernel
+def spline_columns(surface, grid):
+    """(11, nx or more): basis and slopes of each column, its cell; below, sums along x2."""
+    knots = surface.coefficients.shape[2]
+    columns = np.zeros((11, max(grid.nx, knots)))
+    for i in range(grid.nx):
+        cell = spline_cell(surface, grid.x0 + i * grid.dx, surface.y0)
+        b, s = basis(cell.u), basis_slope(cell.u)
+        for k in range(4):
+            columns[k, i] = b[k]
+            columns[4 + k, i] = s[k] / surface.dx
+        columns[8, i] = cell.i
+    return columns
+
+
+@kernel
+def sum_columns(coefficients, j, by, sums):
+    """Sums over the four rows of coefficients from the j-th on, weighted by ``by``."""
+    for i in range(coefficients.shape[1]):
+        sums[i] = (
+            by[0] * coefficients[j, i]
+            + by[1] * coefficients[j + 1, i]
+            + by[2] * coefficients[j + 2, i]
+            + by[3] * coefficients[j + 3, i]
+        )
+
+
+@kernel
+def fill_spline_slopes(columns, fx, fy):
+    """Slopes along a row from the sums along x2 of values and slopes."""
+    values, slopes = columns[9], columns[10]
+    for i in range(fx.shape[0]):
+        c = int(columns[8, i])
+        fx[i], fy[i] = 0.0, 0.0
+        for k in range(4):
+            fx[i] += columns[4 + k, i] * values[c + k]
+            fy[i] += columns[k, i] * slopes[c + k]
+
+
+@kernel
+def multiply_by_cost(columns, row):
+    """Multiply the metric of a row by c^2, from the sums along x2 of log c."""
+    values = columns[9]
+    for i in range(row.shape[1]):
+        c, log_cost = int(columns[8, i]), 0.0
+        for k in range(4):
+            log_cost += columns[k, i] * values[c + k]
+        c2 = math.exp(2.0 * log_cost)
+        row[H11, i] *= c2
+        row[H12, i] *= c2
+        row[H22, i] *= c2
+
+
+@kernel
+def fill_spline_row(surface, grid, j, columns, row):
+    cell = spline_cell(surface, surface.x0, grid.y0 + j * grid.dy)
+    by, sy = basis(cell.v), basis_slope(cell.v)
+    sy = (sy[0] / surface.dy, sy[1] / surface.dy, sy[2] / surface.dy, sy[3] / surface.dy)
+    row[H11], row[H12], row[H22] = 1.0, 0.0, 1.0
+    for layer in range(surface.weights.shape[0]):
+        sum_columns(surface.coefficients[layer], cell.j, by, columns[9])
+        sum_columns(surface.coefficients[layer], cell.j, sy, columns[10])
+        fill_spline_slopes(columns, row[FX], row[FY])
+        add_layer(row, surface.weights[layer] * surface.weights[layer])
+    if surface.log_cost.shape[0] > 0:
+        sum_columns(surface.log_cost[0], cell.j, by, columns[9])
+        multiply_by_cost(columns, row)
+
+
+@per_class({Peaks: peaks_columns, Spline: spline_columns})
+def columns_of(surface, grid):
+    """What the rows of a lattice share."""
+
+
+@per_class({Peaks: fill_peaks_row, Spline: fill_spline_row})
+def fill_row(surface, grid, j, columns, row):
+    """The metric at the nodes of row j: row (ROWS, nx)."""

@@ -1,0 +1,1 @@
+"""What every package may use: files, memory, and who watches long work."""

@@ -1,0 +1,1 @@
+"""Lower bounds with proof: claims, certificates, and the search for them."""

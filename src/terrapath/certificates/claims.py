@@ -1,0 +1,369 @@
+"""Claims: a function whose slope proves that no path is shorter, and the proofs of it.
+
+Where |du| <= M in the dual norm of h, u / M grows by at most a path's length along it. So a
+path from start to goal is at least (u(goal) - u(start)) / M long. Nothing here knows how u
+was found: a proof trusts the problem's surface and obstacles, and nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .._kernels.certificates import norms as kernels
+from .._kernels.surface.surfaces import Spline, fill_values
+from ..errors import CertificateError
+from ..problem import Problem
+from ..space.lattice import Lattice
+from ..surface.costs import span_within
+from ..validation import Array, Bounds
+
+# Far above the rounding of the checker's own arithmetic, far below any gap.
+ROUNDING = 1e-9
+
+# Far above the rounding of a layer's value, in units of the last place of its largest.
+EPSILONS = 64.0
+
+# A norm is not proven any closer than this to what samples of it suggest.
+CLOSE = 3e-5
+
+# Nor below this: a function that is steep nowhere proves nothing, and squares of slopes far below
+# would be rounded to 0.
+FLATTEST = 1e-3
+
+Cells = npt.NDArray[np.bool_]
+
+
+class Core(NamedTuple):
+    """Cells around an end, [column0, column1) x [row0, row1), where the chord counts."""
+
+    column0: int
+    column1: int
+    row0: int
+    row1: int
+
+
+@dataclass(frozen=True, eq=False)
+class Claim:
+    """A lower bound on the length of every path, and the function that is to prove it.
+
+    value : the bound, map units. norm : M, of the dual norm of du on all cells that matter.
+    coefficients : (ny + 2, nx + 2), of the bicubic B-spline u on the cells of a lattice over
+    ``bounds``. horizon : W; cells matter from which the goal could be reached before u / M is
+    W / M. start_core, goal_core : the cells around the ends, where the chord takes the place
+    of u. Outside ``bounds`` every path is long enough on the plane already.
+    """
+
+    value: float
+    norm: float
+    coefficients: Array
+    bounds: Bounds
+    horizon: float
+    start_core: Core
+    goal_core: Core
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """The lattice whose cells u is given on."""
+        rows, columns = self.coefficients.shape
+        return Lattice(self.bounds, columns - 2, rows - 2)
+
+
+def require_sound(claim: Claim) -> None:
+    """Raise CertificateError where a number is none, or the coefficients are no spline's."""
+    value, norm, horizon = claim.value, claim.norm, claim.horizon
+    finite = all(map(math.isfinite, (value, norm, horizon)))
+    if not (finite and norm >= FLATTEST * (1.0 - ROUNDING)):
+        raise CertificateError(
+            f"value={value}, norm={norm} and horizon={horizon} must be finite, the norm at least "
+            f"{FLATTEST:g}"
+        )
+    shape, kind = claim.coefficients.shape, claim.coefficients.dtype
+    if not (len(shape) == 2 and min(shape) >= 4 and kind == np.float64):
+        raise CertificateError(
+            f"coefficients of type {kind} and shape {shape} make no spline; (ny + 2, nx + 2) "
+            "with 2 x 2 nodes at least is expected"
+        )
+    if not np.isfinite(claim.coefficients).all():
+        raise CertificateError("the coefficients are not all finite")
+
+
+def _require_fit(problem: Problem, claim: Claim) -> None:
+    """Raise CertificateError where the parts do not belong together."""
+    if not problem.bounds.encloses(claim.bounds):
+        raise CertificateError(
+            f"the certificate covers {claim.bounds}, which is not within {problem.bounds}"
+        )
+    lattice = claim.lattice
+    for name, point in (("start", problem.start), ("goal", problem.goal)):
+        core: Core = getattr(claim, f"{name}_core")
+        fits = (
+            all(isinstance(k, int) for k in core)
+            and 0 <= core.column0 < core.column1 < lattice.nx
+            and 0 <= core.row0 < core.row1 < lattice.ny
+        )
+        if not (fits and _extent(lattice, core).contains(np.asarray(point))):
+            raise CertificateError(
+                f"the {name} core {tuple(core)} does not hold the {name} {point}"
+            )
+
+
+def _extent(lattice: Lattice, core: Core) -> Bounds:
+    x, y = lattice.x, lattice.y
+    return Bounds(x[core.column0], y[core.row0], x[core.column1], y[core.row1])
+
+
+def _overlap(a: Core, b: Core) -> bool:
+    return a.column0 < b.column1 and b.column0 < a.column1 and a.row0 < b.row1 and b.row0 < a.row1
+
+
+class Ground(NamedTuple):
+    """The surface and the ends as kernels read them, the start being the origin of the plane.
+
+    So no digits are lost far from the map's own origin, nor between ends that lie close.
+    """
+
+    surface: Any
+    start: Array  # lifted, (2 + layers,)
+    goal: Array
+
+
+def _ground(problem: Problem) -> Ground:
+    (x, y), data = problem.start, problem.surface.data
+    moved: Any
+    if isinstance(data, Spline):
+        moved = data._replace(x0=data.x0 - x, y0=data.y0 - y)
+    else:
+        moved = data._replace(peaks=data.peaks - (0.0, 0.0, x, y))
+    ends = np.array([problem.start, problem.goal]) - (x, y)
+    values = np.empty((2, len(data.weights)))
+    fill_values(moved, ends, values)
+    return Ground(moved, *np.concatenate([ends, values * data.weights], axis=1))
+
+
+def _doubt(surface: Any) -> float:
+    """What rounding may add to a chord of a surface, for its layers' values, map units."""
+    if isinstance(surface, Spline):
+        sizes = np.abs(surface.coefficients).max(axis=(1, 2))
+    else:
+        sizes = np.add.reduceat(np.append(np.abs(surface.peaks[:, 0]), 0.0), surface.first[:-1])
+        sizes[np.diff(surface.first) == 0] = 0.0
+    return EPSILONS * float(np.finfo(np.float64).eps) * math.hypot(*(sizes * surface.weights))
+
+
+def _bound(problem: Problem, claim: Claim) -> kernels.Bound:
+    """The function u, the start being the origin."""
+    (x, y), lattice = problem.start, claim.lattice
+    corner_x, corner_y = lattice.bounds.x1_min - x, lattice.bounds.x2_min - y
+    return kernels.Bound(claim.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
+
+
+def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
+    """Room for the pieces that a cell is cut into at the surface's knots."""
+    data: Any = problem.surface.data
+    step = min(data.dx, data.dy) if hasattr(data, "dx") else math.inf
+    return kernels.Cutting(
+        np.empty(int(lattice.dx / step) + 4),
+        np.empty(int(lattice.dy / step) + 4),
+        np.empty((2 * len(data.weights), 11)),
+        np.empty((3 * kernels.DEPTH + 1, 5)),
+    )
+
+
+def exempt_cells(problem: Problem, claim: Claim) -> Cells:
+    """Cells (ny, nx) that no path meets between its start core and its goal core."""
+    exempt = problem.free_space.covered_cells(claim.lattice)
+    for core in (claim.start_core, claim.goal_core):
+        exempt[core.row0 : core.row1, core.column0 : core.column1] = True
+    return exempt
+
+
+class Needs(NamedTuple):
+    """For each cell (ny, nx), the dual norm's bound M that it needs."""
+
+    proven: Array  # enough, by proof
+    likely: Array  # what nine points of the cell need
+    slope: Array  # the dual norm of du at those points
+
+
+def cell_needs(problem: Problem, claim: Claim, enough: float) -> Needs:
+    """For each cell an M that is enough.
+
+    In each cell the dual norm of du is at most M, or every path through it is long enough by
+    the chord from there to the goal. Cells for which ``enough`` is proven are not looked at
+    any closer.
+    """
+    _require_fit(problem, claim)
+    lattice, ground = claim.lattice, _ground(problem)
+    found, likely, slope = np.empty((3, lattice.ny - 1, lattice.nx - 1))
+    kernels.fill_needs(
+        ground.surface,
+        _bound(problem, claim),
+        ground.goal,
+        float(claim.horizon),
+        exempt_cells(problem, claim),
+        float(enough) / (1.0 + ROUNDING),
+        _cutting(problem, lattice),
+        found,
+        likely,
+        slope,
+    )
+    return Needs(found * (1.0 + ROUNDING), likely, slope)
+
+
+def proven_norm(problem: Problem, claim: Claim, found: Array, enough: float = 0.0) -> float:
+    """The least M that is proven to be enough for all cells, or ``enough`` where that is more.
+
+    found : what they need, proven; the largest are looked at closely.
+    """
+    ground = _ground(problem)
+    norm = kernels.least_norm(
+        ground.surface,
+        _bound(problem, claim),
+        ground.goal,
+        float(claim.horizon),
+        np.argsort(found, axis=None)[::-1],
+        found,
+        float(enough) / (1.0 + ROUNDING),
+        _cutting(problem, claim.lattice),
+    )
+    return float(norm) * (1.0 + ROUNDING)
+
+
+class End(NamedTuple):
+    """An end of all paths."""
+
+    core: Core
+    place: tuple[float, float]  # on the map
+    lifted: Array  # (2 + layers,), the start being the origin of the plane
+    doubt: float  # what rounding may add to a chord from it, map units
+
+
+def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
+    """An end, and what is sure of the ground around its core.
+
+    The ground is the core and half as much again on all sides. A path of length s there, costs left
+    out, has met no cost below c - G s, c being that at the end and G the steepest slope; so to
+    a distance of d it is (c - G d / 2) d long.
+    """
+    surface, data = problem.surface, problem.surface.data
+    if not (surface.costs and isinstance(data, Spline)):
+        return kernels.Anchor(end.lifted, 1.0, math.inf)
+    x0, y0, x1, y1 = _extent(claim.lattice, end.core)
+    width, height = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
+    around = Bounds(x0 - width, y0 - height, x1 + width, y1 + height)
+    (x, y), bounds = end.place, problem.bounds
+    # Beyond the bounds no path can go.
+    sides = (
+        (x - around.x1_min, around.x1_min > bounds.x1_min),
+        (y - around.x2_min, around.x2_min > bounds.x2_min),
+        (around.x1_max - x, around.x1_max < bounds.x1_max),
+        (around.x2_max - y, around.x2_max < bounds.x2_max),
+    )
+    far = min((distance for distance, is_inside in sides if is_inside), default=math.inf)
+    found, cost = span_within(data, around), float(surface.cost((x, y)))
+    farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
+    floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
+    return kernels.Anchor(end.lifted, floor, found.least * (1.0 - ROUNDING) * float(far))
+
+
+def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> float:
+    """At most distance(end, p) + factor u(p) for all p on the edge of its core, map units.
+
+    The distance is bounded by the chord and the least cost around.
+    """
+    core, anchor = end.core, _anchor(problem, claim, end)
+    margin = kernels.margin_of_core(
+        _ground(problem).surface,
+        _bound(problem, claim),
+        anchor,
+        float(factor),
+        core.column0,
+        core.column1,
+        core.row0,
+        core.row1,
+        _cutting(problem, claim.lattice),
+    )
+    return float(margin) - anchor.floor * end.doubt
+
+
+def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
+    """The bound that follows where the dual norm is at most ``norm``, map units.
+
+    Let a path leave the start core for the last time at p, and enter the goal core after
+    that for the first time at q. It is at least distance(start, p) + (u(q) - u(p)) / M +
+    distance(q, goal) long, or meets a cell from where it is at least (W - u(p)) / M to the goal.
+    """
+    surface, start, goal = _ground(problem)
+    doubt = _doubt(surface)
+    least = problem.surface.least_cost
+    straight = max(least * (math.dist(start, goal) * (1.0 - ROUNDING) - doubt), 0.0)
+    if _overlap(claim.start_core, claim.goal_core):
+        return straight
+    detour = least * least_detour(problem, claim.bounds) * (1.0 - ROUNDING)
+    begin = End(claim.start_core, problem.start, start, doubt)
+    end = End(claim.goal_core, problem.goal, goal, doubt)
+    first = edge_margin(problem, claim, begin, -1.0 / norm)
+    last = edge_margin(problem, claim, end, 1.0 / norm)
+    rest = min(last, claim.horizon / norm - least * doubt)
+    within = first + rest - ROUNDING * (abs(first) + abs(rest))
+    # No number, where something overflowed.
+    return max(min(within, detour), straight) if within > straight else straight
+
+
+def least_detour(problem: Problem, window: Bounds) -> float:
+    """The least length on the plane of a path that leaves a window of the problem's bounds.
+
+    It is at least as long as the planar way by a side of the window: to the goal's mirror
+    image there.
+    """
+    (x0, y0), (x1, y1) = problem.start, problem.goal
+    outer, found = problem.bounds, math.inf
+    # Differences first: far from the map's origin the sum of two places loses digits.
+    for side, edge in ((window.x1_min, outer.x1_min), (window.x1_max, outer.x1_max)):
+        if side != edge:
+            found = min(found, math.hypot((x0 - side) + (x1 - side), y1 - y0))
+    for side, edge in ((window.x2_min, outer.x2_min), (window.x2_max, outer.x2_max)):
+        if side != edge:
+            found = min(found, math.hypot(x1 - x0, (y0 - side) + (y1 - side)))
+    return found
+
+
+def require_proven(problem: Problem, claim: Claim) -> None:
+    """Prove a claim from nothing but the problem.
+
+    Raises CertificateError, saying what cannot be proven.
+    """
+    found = cell_needs(problem, claim, claim.norm)
+    norm = proven_norm(problem, claim, found.proven, claim.norm)
+    # Another machine's exponentials may differ in the last digit.
+    alike = 1.0 + 1e-3 * ROUNDING
+    if not norm <= claim.norm * alike:
+        raise CertificateError(
+            f"the dual norm is claimed to be at most {claim.norm:.12g}, but no less than "
+            f"{norm:.12g} can be proven"
+        )
+    proven = proven_value(problem, claim, claim.norm)
+    if not claim.value <= proven * alike:
+        raise CertificateError(
+            f"the bound is claimed to be {claim.value:.12g}, but no more than {proven:.12g} "
+            "can be proven"
+        )
+
+
+def proven_claim(problem: Problem, claim: Claim, found: Needs) -> Claim:
+    """The claim with the norm and the value that are proven; found : what its cells need.
+
+    Where no norm can be proven, the straight line's length in R^n is the bound.
+    """
+    enough = max(float(found.likely.max()) * (1.0 + CLOSE), FLATTEST)
+    norm = proven_norm(problem, claim, found.proven, enough)
+    if not math.isfinite(norm):
+        nothing = np.zeros_like(claim.coefficients)
+        claim, norm = replace(claim, coefficients=nothing, horizon=0.0), 1.0
+    return replace(claim, norm=norm, value=proven_value(problem, claim, norm))

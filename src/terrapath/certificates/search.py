@@ -1,0 +1,279 @@
+"""Lower bounds on the length of every path: functions u that a claim can be made of.
+
+A distance field solves |du| = 1 up to its own small errors. Its values as coefficients of a
+B-spline average its slopes, which never overshoots at the kinks of the cut locus, and so make
+a smooth u whose dual norm is 1 nearly everywhere. Where it is more, lengths are shrunk a little
+and the field is solved again: no shortest path crosses the cut locus, where most of the
+excess is, so this costs next to nothing at the goal.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
+
+from ..distance.field import Medium, march_from
+from ..distance.source import model_source, near_distance, window_radius
+from ..problem import Problem
+from ..space.lattice import Lattice
+from ..validation import Array, Bounds, require_positive
+from .certificate import Certificate, certify
+from .claims import Claim, Core, Needs, cell_needs
+
+# Sees each certificate; returning True stops the search.
+Watch = Callable[[Certificate], bool | None]
+
+# Lattices tried, nodes on the longer side, the first where nothing better is asked for.
+SIDES = (120, 240, 360, 480, 800, 1400)
+
+# Repairs of one lattice at most, before the next finer one is tried.
+REPAIRS = 3
+
+# Cells whose norm is above this are repaired. Below 1, for a norm is looked at in nine points
+# of a cell, and is more between them.
+TOLERATED = 0.9998
+
+# Half the side of the neighbourhood in which a repair shrinks lengths, in nodes.
+REACH = 2
+
+# The search never looks at less ground than this share of the bounds' longer side.
+SMALLEST_WINDOW = 1e-6
+
+# The core reaches so many cells from the start.
+CORE = 4
+
+
+def mollified(u: Array, cap: float) -> Array:
+    """Coefficients of the spline that averages u (ny, nx), truncated at ``cap``."""
+    inner = np.minimum(u, cap)
+    return np.pad(inner, 1, mode="reflect", reflect_type="odd")
+
+
+def _blocked_nodes(problem: Problem, lattice: Lattice) -> npt.NDArray[np.bool_]:
+    """Nodes whose coefficients matter to no cell that a path can meet.
+
+    Those are the nodes that all cells of within two columns and rows are covered.
+    """
+    if not problem.free_space.has_obstacles:
+        return np.zeros((lattice.ny, lattice.nx), bool)
+    covered = np.pad(problem.free_space.covered_cells(lattice), 2, constant_values=True)
+    # Window of 4 x 4 cells around a node.
+    return np.asarray(~_windows(~covered, 4))
+
+
+def _largest_within(values: Array, reach: int) -> Array:
+    """Largest of the values (ny, nx) at most ``reach`` rows and columns away.
+
+    As SciPy's maximum_filter, which takes longer to import than to run.
+    """
+    return np.asarray(_windows(np.pad(values, reach, mode="edge"), 2 * reach + 1))
+
+
+def _windows(values: Any, size: int) -> Any:
+    """Largest of each window of size x size, numbers or truth values."""
+    rows = sliding_window_view(values, size, axis=0).max(axis=-1)
+    return sliding_window_view(rows, size, axis=1).max(axis=-1)
+
+
+def _cores(problem: Problem, lattice: Lattice) -> tuple[Core, Core]:
+    """The cells around both ends: so many that they do not meet."""
+    bounds = lattice.bounds
+    corner, cell = np.array([bounds.x1_min, bounds.x2_min]), np.array([lattice.dx, lattice.dy])
+    ends = [(np.asarray(end) - corner) / cell for end in (problem.start, problem.goal)]
+    apart = int(np.abs(ends[0] - ends[1]).max() / 2.0 - 1.0)
+    reach = min(max(apart, 1), CORE)
+    start, goal = (
+        Core(
+            max(round(column) - reach, 0),
+            min(round(column) + reach, lattice.nx - 1),
+            max(round(row) - reach, 0),
+            min(round(row) + reach, lattice.ny - 1),
+        )
+        for column, row in ends
+    )
+    return start, goal
+
+
+def _horizon(problem: Problem, lattice: Lattice, u: Array, core: Core) -> float:
+    """Least distance by way of the goal core's edge, as far as the nodes there tell."""
+    window = np.s_[core.row0 : core.row1 + 1, core.column0 : core.column1 + 1]
+    nodes = np.stack(np.meshgrid(lattice.x, lattice.y), axis=-1)[window]
+    through = u[window] + near_distance(problem.surface, problem.goal, nodes)
+    through[1:-1, 1:-1] = math.inf
+    return float(through.min())
+
+
+def _repair_factors(found: Needs) -> Array:
+    """Factors (ny, nx) of lengths at the nodes that bring the norm of cells down."""
+    excess = np.where(found.likely > TOLERATED, found.slope / TOLERATED, 1.0)
+    at_nodes = _windows(np.pad(excess, 1, mode="edge"), 2)
+    return np.asarray(1.0 / _largest_within(at_nodes, REACH))
+
+
+class Search:
+    """The search for a bound on one lattice.
+
+    cap : distances beyond it do not matter, map units.
+    """
+
+    def __init__(self, problem: Problem, lattice: Lattice, cap: float) -> None:
+        self.problem, self.lattice, self.cap = problem, lattice, cap
+        self.medium = Medium.around(problem.surface, lattice, _blocked_nodes(problem, lattice))
+        self.model = model_source(
+            lattice,
+            problem.start,
+            window_radius(problem.surface, lattice),
+            lambda points: near_distance(problem.surface, problem.start, points),
+        )
+        self.start_core, self.goal_core = _cores(problem, lattice)
+        self.repairs = 0
+        self._solve()
+
+    def _solve(self) -> None:
+        u = self.medium.march(self.model, limit=self.cap)
+        cap = min(self.cap, float(u[np.isfinite(u)].max(initial=0.0)))
+        self.proposal = Claim(
+            value=0.0,
+            norm=math.inf,
+            coefficients=mollified(u, cap),
+            bounds=self.lattice.bounds,
+            horizon=min(_horizon(self.problem, self.lattice, u, self.goal_core), cap),
+            start_core=self.start_core,
+            goal_core=self.goal_core,
+        )
+        self.needs = cell_needs(self.problem, self.proposal, TOLERATED)
+
+    @property
+    def likely_norm(self) -> float:
+        """What the dual norm will be proven to be at best."""
+        return float(self.needs.likely.max())
+
+    def repair(self) -> None:
+        """Shrink lengths where the dual norm is too large, and solve again."""
+        self.medium.shrink(_repair_factors(self.needs))
+        self.repairs += 1
+        self._solve()
+
+    def certify(self) -> Certificate:
+        """The certificate that the field as it is makes."""
+        return certify(self.problem, self.proposal, self.needs)
+
+
+def search_window(problem: Problem, length: float) -> Bounds:
+    """The part of the bounds that a path no longer than ``length`` can visit."""
+    (x0, y0), (x1, y1) = problem.start, problem.goal
+    bounds = problem.bounds
+    straight = math.hypot(x1 - x0, y1 - y0)
+    if not math.isfinite(length) or straight == 0.0:
+        return bounds
+    # An ellipse about both ends, its axes half as long as these.
+    major = max(length / problem.surface.least_cost, straight) * (1.0 + 1e-6)
+    minor = math.sqrt(major - straight) * math.sqrt(major + straight)
+    cosine, sine = (x1 - x0) / straight, (y1 - y0) / straight
+    least = SMALLEST_WINDOW * max(bounds.width, bounds.height)
+    east = max(0.5 * math.hypot(major * cosine, minor * sine), least)
+    north = max(0.5 * math.hypot(major * sine, minor * cosine), least)
+    middle_x, middle_y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+    return Bounds(
+        max(min(middle_x - east, x0, x1), bounds.x1_min),
+        max(min(middle_y - north, y0, y1), bounds.x2_min),
+        min(max(middle_x + east, x0, x1), bounds.x1_max),
+        min(max(middle_y + north, y0, y1), bounds.x2_max),
+    )
+
+
+def certificates(
+    problem: Problem, length: float = math.inf, *, target_gap: float = 0.0
+) -> Iterator[Certificate]:
+    """Ever better certificates, from ever finer lattices.
+
+    length : of a path that is known, map units. A lattice is given up for the next finer one
+    when its norm takes no more than a quarter of the target gap, or repairs gain little.
+    """
+    window = search_window(problem, length)
+    cap = length * (1.0 + 1e-6)
+    for side in SIDES:
+        spacing = max(window.width, window.height) / side
+        search = Search(problem, Lattice.spanning(window, spacing), cap)
+        tolerable = 1.0 + max(0.25 * target_gap, 5e-5)
+        for _ in range(REPAIRS):
+            before = search.likely_norm
+            if before <= tolerable:
+                break
+            search.repair()
+            if search.likely_norm - 1.0 > 0.7 * (before - 1.0):
+                break
+        yield search.certify()
+
+
+def lower_bound(
+    problem: Problem,
+    *,
+    length: float | None = None,
+    target_gap: float | None = None,
+    time_limit: float | None = None,
+    watch: Watch | None = None,
+) -> Certificate:
+    """A proven lower bound on the length of every path from start to goal.
+
+    length : of a path that is known, map units; it lets the search leave out ground that no
+    shorter path can visit. target_gap : (length - bound) / bound at which to stop; by default
+    the search stops after the first, coarsest lattice. time_limit : seconds, looked at between
+    lattices. watch : called with each certificate; returning True stops the search.
+    Where no path is known, or none exists, the search stops after the first lattice, too.
+    Returns the best certificate found, which compares with numbers as its value.
+    """
+    _check(length, target_gap, time_limit)
+    deadline = time.perf_counter() + (math.inf if time_limit is None else time_limit)
+    # What is no number proves nothing, and so needs no warning.
+    with np.errstate(all="ignore"):
+        known = known_length(problem) if length is None else length
+        return _best(problem, known, target_gap, deadline, watch)
+
+
+def _best(
+    problem: Problem,
+    length: float,
+    target_gap: float | None,
+    deadline: float,
+    watch: Watch | None,
+) -> Certificate:
+    """The best certificate found when there is reason to stop."""
+    best: Certificate | None = None
+    for found in certificates(problem, length, target_gap=target_gap or 0.0):
+        if best is None or found.value > best.value:
+            best = found
+        # Where no path is known, no bound comes close to its length.
+        if target_gap is None or math.isinf(length):
+            break
+        if length - best.value <= target_gap * best.value:
+            break
+        if watch is not None and watch(best):
+            break
+        if time.perf_counter() > deadline:
+            break
+    assert best is not None
+    return best
+
+
+def _check(length: float | None, target_gap: float | None, time_limit: float | None) -> None:
+    given = {"length": length, "target_gap": target_gap, "time_limit": time_limit}
+    for name, value in given.items():
+        if value is not None and not (name == "length" and value in (0.0, math.inf)):
+            require_positive(**{name: value})
+
+
+def known_length(problem: Problem) -> float:
+    """Length of some path, map units; infinite where none is found quickly."""
+    spacing = max(problem.bounds.width, problem.bounds.height) / SIDES[0]
+    lattice = Lattice.spanning(problem.bounds, spacing)
+    medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
+    field = march_from(problem.surface, problem.free_space, problem.start, medium)
+    path = field.path_to(problem.goal)
+    return math.inf if path is None else path.length

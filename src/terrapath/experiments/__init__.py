@@ -1,1 +1,0 @@
-"""Floor 7: experiments, each a function that returns data."""

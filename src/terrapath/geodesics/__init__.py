@@ -1,0 +1,5 @@
+"""Geodesics of h: rays and the exponential map, refinement, alternatives."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,171 @@
+"""Distinct locally shortest routes: which side of which peak or obstacle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+import shapely
+
+from ..distance.field import DistanceField, Medium, march_from
+from ..errors import warn_unfinished
+from ..problem import Path, Problem
+from ..space.lattice import Lattice
+from ..validation import Array, require_count, require_positive
+from .refinement import refine
+
+# Nodes are candidates to lead a route through where their detour is least within this share
+# of the region's side.
+NEIGHBOURHOOD = 1.0 / 40.0
+
+# Routes more than so many times as long as the shortest are of no interest.
+LONGEST = 1.5
+
+# Candidates traced and refined for each route that is asked for.
+TRIES = 6
+
+# Routes are the same where they are nowhere farther apart than this share of the region's side,
+# or end up equally long and nowhere farther apart than a neighbourhood.
+SAME_PLACE = 1e-3
+SAME_LENGTH = 1e-7
+
+# Places along a route that are compared with another one.
+LOOKS = 65
+
+
+def alternatives(
+    problem: Problem, count: int = 5, *, spacing: float | None = None
+) -> tuple[Path, ...]:
+    """The distinct locally shortest routes from start to goal, each refined, shortest first.
+
+    count : at most so many. spacing : of the nodes that routes are searched on, map units; by
+    default a 250th of the region's longer side, or a cell of a finer map.
+    A route is led through a node off the routes found before, where the sum of the distances
+    from start and goal is least. Empty where no route was found on the nodes. One that cannot be
+    refined is left out, with a warning; the error is raised only where none can be.
+    """
+    require_count(count=count)
+    if spacing is not None:
+        require_positive(spacing=spacing)
+    if problem.start == problem.goal:
+        return (problem.path([problem.start, problem.goal]),)
+    lattice = Lattice.spanning(problem.bounds, spacing or problem.default_spacing)
+    medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
+    fields = [
+        march_from(problem.surface, problem.free_space, end, medium)
+        for end in (problem.start, problem.goal)
+    ]
+    failures: list[Exception] = []
+    found = list(routes_of_fields(problem, fields[0], fields[1], count, failed=failures.append))
+    if failures and not found:
+        raise failures[0]
+    if failures:
+        warn_unfinished("not every route could be refined; the others are given", failures[0])
+    return shortest(found, count)
+
+
+def shortest(routes: Iterable[Path], count: int) -> tuple[Path, ...]:
+    """So many of the routes at most, shortest first."""
+    return tuple(sorted(routes, key=lambda route: route.length)[:count])
+
+
+def routes_of_fields(
+    problem: Problem,
+    from_start: DistanceField,
+    from_goal: DistanceField,
+    count: int,
+    *,
+    failed: Callable[[Exception], object],
+    must_stop: Callable[[], bool] | None = None,
+) -> Iterator[Path]:
+    """Distinct routes as they are refined, the way down the fields first, the others in no order.
+
+    from_start, from_goal : distance fields on one lattice. count : routes that are asked for;
+    more are looked for, since a later one may be shorter. failed : told why a route could not
+    be refined. must_stop : looked at after each candidate; it may end the search.
+    """
+    found: list[Path] = []
+    for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
+        try:
+            route = refine(problem, candidate)
+        except Exception as error:
+            failed(error)
+        else:
+            if not any(_is_same(problem, route, other) for other in found):
+                found.append(route)
+                yield route
+        if tries >= TRIES * count or (must_stop is not None and must_stop()):
+            break
+
+
+def _candidates(
+    problem: Problem, from_start: DistanceField, from_goal: DistanceField
+) -> Iterator[Path]:
+    """Routes through the nodes with the least detours, each off all that came before."""
+    direct = from_start.path_to(problem.goal)
+    if direct is None:
+        return
+    yield direct
+    lattice = from_start.lattice
+    radius = NEIGHBOURHOOD * problem.bounds.side
+    points = _via_points(from_start.values + from_goal.values, lattice, radius)
+    points = _away_from(direct, points, radius)
+    while len(points):
+        path = _lead_through(problem, from_start, from_goal, points[0])
+        points = points[1:]
+        if path is not None:
+            points = _away_from(path, points, radius)
+            yield path
+
+
+def _away_from(path: Path, points: Array, radius: float) -> Array:
+    """The points (m, 2) that are farther than a radius from a path."""
+    near = np.asarray(shapely.dwithin(path.line, shapely.points(points), radius))
+    return np.asarray(points[~near])
+
+
+def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:
+    """Nodes (m, 2) where the detour is least in a neighbourhood, by rising detour."""
+    from scipy.ndimage import minimum_filter
+
+    size = (2 * math.ceil(radius / lattice.dy) + 1, 2 * math.ceil(radius / lattice.dx) + 1)
+    least = minimum_filter(detours, size=size, mode="nearest")
+    longest = LONGEST * float(detours.min())
+    chosen = np.isfinite(detours) & (detours <= least) & (detours <= longest)
+    rows, columns = np.nonzero(chosen)
+    order = np.argsort(detours[chosen], kind="stable")
+    return np.column_stack([lattice.x[columns], lattice.y[rows]])[order]
+
+
+def _lead_through(
+    problem: Problem, from_start: DistanceField, from_goal: DistanceField, point: Array
+) -> Path | None:
+    """The shortest path that visits a point."""
+    first, second = from_start.path_to(point), from_goal.path_to(point)
+    if first is None or second is None:
+        return None
+    return problem.path(np.concatenate([first.points[:-1], second.points[::-1]]))
+
+
+def _is_same(problem: Problem, a: Path, b: Path) -> bool:
+    side = problem.bounds.side
+    if _stay_together(a, b, SAME_PLACE * side):
+        return True
+    alike = abs(a.length - b.length) <= SAME_LENGTH * max(a.length, b.length)
+    return alike and _stay_together(a, b, NEIGHBOURHOOD * side)
+
+
+def _stay_together(a: Path, b: Path, distance: float) -> bool:
+    """Is neither path farther than a distance from the other, as far as LOOKS places tell?"""
+    shares = np.linspace(0.0, 1.0, LOOKS)
+    return all(
+        bool(
+            shapely.dwithin(
+                other.line,
+                shapely.line_interpolate_point(one.line, shares, normalized=True),
+                distance,
+            ).all()
+        )
+        for one, other in ((a, b), (b, a))
+    )

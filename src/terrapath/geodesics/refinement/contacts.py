@@ -1,0 +1,272 @@
+"""Pulling a path taut among obstacles.
+
+A path is a polyline whose points are free, or slide along a wall, or are held by a corner
+that the path bends round. Newton's method says where the points should go. On the way there
+the path is stopped at the first corner that it meets, which then holds it, and points stop at
+the walls that they meet; so it never jumps over an obstacle. When all is still, corners and
+walls that pull at the path rather than push it are let go.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..._kernels.geodesics import contacts as kernels
+from ..._kernels.geodesics.newton import Strand
+from ...space.free_space import Indices
+from ...surface import Surface
+from ...validation import Array
+from .newton import lift, lower
+from .walls import SLACK, Surroundings
+
+NONE = -1
+MOST_ROUNDS = 1500
+# Of one corner. The last piece before a disc is long, and the way it points is off by so much
+# that the corner seems to pull; it is met again as soon as it is let go.
+MOST_RELEASES = 3
+# Radians that a path turns by at a contact that pulls, before it is let go.
+LEAST_PULL = 1e-6
+# A taut path turns by a right angle at most where it bends round a corner: this is the cosine
+# of more than that. Whatever turns by more goes there and back.
+TURNED_BACK = -0.1
+TINY = 1e-300
+# A point this near to a corner's place, as a share of the clearance, is at it.
+AT_CORNER = 0.05
+
+
+@dataclass(frozen=True)
+class Band:
+    """A polyline and what holds each of its points.
+
+    points : (m, 2), map units. bends : (m,), the corner a point is at, or NONE.
+    walls : (m, 2), those a point touches, or NONE.
+    """
+
+    points: Array
+    bends: Indices
+    walls: Indices
+
+    @classmethod
+    def free(cls, points: Array) -> Band:
+        """A polyline that touches nothing."""
+        return cls(points, np.full(len(points), NONE), np.full((len(points), 2), NONE))
+
+    @property
+    def is_held(self) -> npt.NDArray[np.bool_]:
+        """(m,): may a point not move at all? So it is for both ends, and at corners."""
+        held = np.asarray(self.bends != NONE)
+        held[[0, -1]] = True
+        return held
+
+    def inserted(self, before: Indices, points: Array, bends: Any) -> Band:
+        """With further points, each in front of the point of that index."""
+        return Band(
+            np.insert(self.points, before, points, axis=0),
+            np.insert(self.bends, before, bends),
+            np.insert(self.walls, before, np.full((len(before), 2), NONE), axis=0),
+        )
+
+    def chosen(self, which: Any) -> Band:
+        """Some of the points: a slice, indices or (m,) bool."""
+        return Band(self.points[which], self.bends[which], self.walls[which])
+
+
+def subdivided(band: Band, longest: float) -> Band:
+    """With pieces of at most that length on the plane, map units."""
+    sizes = np.hypot(*np.diff(band.points, axis=0).T)
+    cuts = np.maximum(np.ceil(sizes / longest - 1e-9), 1).astype(int) - 1
+    at = np.repeat(np.arange(len(sizes)), cuts)
+    if len(at) == 0:
+        return band
+    first = np.repeat(np.cumsum(cuts) - cuts, cuts)
+    within = ((np.arange(1, len(at) + 1) - first) / (cuts[at] + 1))[:, None]
+    places = (1.0 - within) * band.points[at] + within * band.points[at + 1]
+    finer = band.inserted(at + 1, places, NONE)
+    # A piece along one wall stays on it.
+    shared = band.walls[at, 0] == band.walls[at + 1, 0]
+    finer.walls[at + 1 + np.arange(len(at)), 0] = np.where(shared, band.walls[at, 0], NONE)
+    return finer
+
+
+def _directions(points: Array) -> Array:
+    """Unit vectors along the pieces. (m, 2) -> (m - 1, 2)."""
+    steps = np.diff(points, axis=0)
+    return np.asarray(steps / np.maximum(np.hypot(*steps.T), TINY)[:, None])
+
+
+def adopted(around: Surroundings, band: Band) -> Band:
+    """With the points held that lie at corners."""
+    if len(around.corners) == 0:
+        return band
+    from scipy.spatial import cKDTree
+
+    reach = AT_CORNER * float(around.clearance.min())
+    distance, nearest = cKDTree(around.corners).query(band.points, distance_upper_bound=reach)
+    found = np.isfinite(distance) & (band.bends == NONE)
+    found[[0, -1]] = False
+    points = band.points.copy()
+    points[found] = around.corners[nearest[found]]
+    return replace(band, points=points, bends=np.where(found, nearest, band.bends))
+
+
+def projectors(around: Surroundings, band: Band) -> Array:
+    """(m - 2, 2, 2), onto the moves that each inner point may make."""
+    allowed = np.zeros((len(band.points), 2, 2))
+    allowed[:, 0, 0] = allowed[:, 1, 1] = 1.0
+    sliding = np.flatnonzero(band.walls[:, 0] != NONE)
+    normals = around.walls.normals[band.walls[sliding, 0]]
+    allowed[sliding] -= normals[:, :, None] * normals[:, None, :]
+    allowed[band.is_held | (band.walls[:, 1] != NONE)] = 0.0
+    return allowed[1:-1]
+
+
+# Moving
+
+
+def advanced(around: Surroundings, band: Band, target: Array) -> tuple[Band, Indices]:
+    """The band moved towards the target (m, 2), as far as obstacles let it.
+
+    Points stop at the walls that they meet. A stretch between two held points stops where it
+    first meets a corner, which then holds it: the points in front of which these corners were
+    put are returned, too.
+    """
+    moves = target - band.points
+    hits = _stop_at_walls(around, band.points, moves)
+    times, corners = np.empty(len(moves) - 1), np.empty(len(moves) - 1, np.int64)
+    kernels.fill_corners(around.walls, band.points, moves, band.bends, times, corners)
+    if times.min() > 1.0 and (hits == NONE).all():
+        return replace(band, points=target), np.empty(0, np.int64)
+    stretch = np.cumsum(band.is_held) - 1
+    ends = np.full(stretch[-1] + 1, np.inf)
+    np.minimum.at(ends, stretch[:-1], times)
+    points = band.points + np.minimum(ends, 1.0)[stretch][:, None] * moves
+    arrived = (hits != NONE) & (ends[stretch] > 1.0)
+    walls = band.walls.copy()
+    order = (walls[arrived, 0] != NONE).astype(int)
+    walls[np.flatnonzero(arrived), order] = hits[arrived]
+    moved = replace(band, points=points, walls=walls)
+    met = np.flatnonzero((times == ends[stretch[:-1]]) & (times <= 1.0))
+    at = met[np.unique(stretch[met], return_index=True)[1]]  # one a stretch
+    return moved.inserted(at + 1, around.corners[corners[at]], corners[at]), at + 1
+
+
+def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices:
+    """The wall that each point meets, or NONE; the moves, written to, end there."""
+    times, hits = np.empty(len(moves)), np.empty(len(moves), np.int64)
+    kernels.fill_walls(around.walls, points, moves, times, hits)
+    met = hits != NONE
+    slack = SLACK * around.clearance[hits[met], None] * around.walls.normals[hits[met]]
+    moves[met] = times[met, None] * moves[met] + slack
+    return hits
+
+
+# Letting go
+
+
+def _forces(path: Strand) -> Array:
+    """Minus the derivative of the length by each inner point, over the cost: (m - 2, 2)."""
+    chords, costs = path.chords, np.sqrt(path.stiffness)
+    sizes = np.linalg.norm(chords, axis=1)
+    pulls = np.diff(costs[:, None] * chords / np.maximum(sizes, TINY)[:, None], axis=0)
+    slopes = path.jets[1:-1, :, 1:3] * path.weights[:, None]
+    shares = sizes / costs
+    drift = 0.25 * (shares[1:] + shares[:-1])[:, None] * path.costs[1:-1, 1:3]
+    force = pulls[:, :2] + np.einsum("mk,mka->ma", pulls[:, 2:], slopes) - drift
+    return np.asarray(force / np.sqrt(path.costs[1:-1, :1]))
+
+
+def outwards(around: Surroundings, band: Band) -> Array:
+    """(m - 2, 2): at corners, unit vectors across the way that lead off the obstacle; else 0."""
+    along = _directions(band.points)
+    way = along[1:] + along[:-1]
+    left = np.column_stack([-way[:, 1], way[:, 0]]) / np.maximum(np.hypot(*way.T), TINY)[:, None]
+    off = np.zeros_like(left)
+    bent = band.bends[1:-1] != NONE
+    corners = band.bends[1:-1][bent]
+    off[bent] = around.corners[corners] - around.walls.corners[corners]
+    return np.asarray(np.sign((off * left).sum(axis=1))[:, None] * left)
+
+
+def loosened(
+    around: Surroundings, band: Band, path: Strand, releases: dict[int, int]
+) -> Band | None:
+    """Without the contacts that pull at the path; None where there is none of them.
+
+    path : the band, lifted. releases : how often each corner was let go already; it is written to.
+    """
+    force = _forces(path)
+    pull = (force * outwards(around, band)).sum(axis=1)
+    along = _directions(band.points)
+    turns_back = (along[1:] * along[:-1]).sum(axis=1) < TURNED_BACK
+    pulling = np.zeros(len(band.points), bool)
+    pulling[1:-1] = (band.bends[1:-1] != NONE) & ((pull > LEAST_PULL) | turns_back)
+    for k in np.flatnonzero(pulling).tolist():
+        corner = int(band.bends[k])
+        releases[corner] = releases.get(corner, 0) + 1
+        pulling[k] = releases[corner] <= MOST_RELEASES
+    walls = band.walls.copy()
+    for which in (1, 0):
+        touching = np.flatnonzero(band.walls[1:-1, which] != NONE)
+        normals = around.walls.normals[band.walls[1 + touching, which]]
+        off = (force[touching] * normals).sum(axis=1) > LEAST_PULL
+        walls[1 + touching[off], which] = NONE
+    only_second = (walls[:, 0] == NONE) & (walls[:, 1] != NONE)
+    walls[only_second] = walls[only_second][:, ::-1]
+    if not pulling.any() and (walls == band.walls).all():
+        return None
+    return replace(band, bends=np.where(pulling, NONE, band.bends), walls=walls)
+
+
+def _without_loops(band: Band) -> Band:
+    """Without what leads from a corner back to the same one, held by nothing in between."""
+    held = np.flatnonzero(band.is_held)
+    again = (band.bends[held[1:]] == band.bends[held[:-1]]) & (band.bends[held[1:]] != NONE)
+    if not again.any():
+        return band
+    kept = np.ones(len(band.points), bool)
+    for first, last in zip(held[:-1][again], held[1:][again], strict=True):
+        kept[first + 1 : last + 1] = False
+    return band.chosen(kept)
+
+
+def _slid_off(around: Surroundings, band: Band) -> Band:
+    """Points that slid beyond the end of their wall are free again."""
+    touching = np.flatnonzero(band.walls[:, 0] != NONE)
+    if len(touching) == 0:
+        return band
+    edges = around.walls.edges[band.walls[touching, 0]]
+    along, offset = edges[:, 2:] - edges[:, :2], band.points[touching] - edges[:, :2]
+    within = (along * offset).sum(axis=1) / (along**2).sum(axis=1)
+    off = touching[(within < 0.0) | (within > 1.0)]
+    if len(off) == 0:
+        return band
+    walls = band.walls.copy()
+    walls[off] = NONE
+    return replace(band, walls=walls)
+
+
+def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
+    """The band pulled taut: no move of its points that obstacles leave them shortens it."""
+    releases: dict[int, int] = {}
+    path = None
+    for _ in range(MOST_ROUNDS):
+        if path is None or path.points is not band.points:
+            path = lift(surface, band.points)
+        found = lower(surface, path, projectors(around, band))
+        if found is None:
+            shorter = _without_loops(band)
+            if shorter is not band:
+                band = shorter
+                continue
+            looser = loosened(around, band, path.strand, releases)
+            if looser is None:
+                break
+            band = looser
+            continue
+        band, _ = advanced(around, band, found.points)
+        band, path = _slid_off(around, band), found
+    return band

@@ -1,0 +1,262 @@
+"""The taut path among obstacles, from the first pull to the points that are laid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ..._kernels.space import free_space as grids
+from ...problem import Problem
+from ...space.free_space import Circle, FreeSpace, Indices
+from ...surface import Surface
+from ...validation import Array
+from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
+from .newton import settle
+from .smooth import correct, curve_through, laid_shares
+from .walls import Surroundings, surroundings
+
+# Between a path and what it touches, as a share of the region's side.
+CLEARANCE = 1e-8
+# Where the path given is nearer to something than that, a smaller one is tried.
+CLEARANCE_ATTEMPTS = 4
+
+# Points that are nearer to one another, as a share of the region's side, are one.
+REPEATED = 1e-10
+
+# Of the polygons that stand for discs: from coarse to fine, by fours.
+FEWEST_SIDES, MOST_SIDES = 64, 4096
+
+# Pieces of the polyline a feature of the surface, stage by stage.
+PIECES_PER_FEATURE = (2.0, 8.0)
+MOST_PIECES = 4096
+FEWEST_PIECES = 8  # of the path, and of each smooth stretch
+# A piece shorter than this share of a feature is as good as straight.
+STRAIGHT = 3e-3
+SMOOTHING_ROUNDS = 10
+
+
+def taut_paths(problem: Problem, points: Array, tolerance: float) -> Iterator[Array]:
+    """Polylines (m, 2) that are ever closer to the taut path that the given one is pulled to."""
+    surface, space = problem.surface, problem.free_space
+    around = _around(space, points)
+    if around is None:
+        return
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    band = Band.free(points)
+    for pieces in PIECES_PER_FEATURE:
+        longest = max(surface.resolution / pieces, length / MOST_PIECES)
+        longest = min(longest, length / FEWEST_PIECES)
+        band = tightened(surface, around, adopted(around, subdivided(band, longest)))
+        while (finer := _with_finer_discs(space, around, band)) is not None:
+            around, band = finer
+            band = tightened(surface, around, subdivided(band, longest))
+        band = _pruned(around, band)
+        yield _tidied(problem, band.points)
+    band = _smoothed(surface, around, band)
+    yield _tidied(problem, band.points)
+    yield _tidied(problem, _laid(surface, around, band, tolerance))
+
+
+def _tidied(problem: Problem, points: Array) -> Array:
+    """Without repeated points, and those that are off the bounds by rounding put on their edge."""
+    apart = np.hypot(*np.diff(points, axis=0).T) > REPEATED * problem.bounds.side
+    kept = np.concatenate([points[:1], points[1:-1][apart[:-1]], points[-1:]])
+    x0, y0, x1, y1 = problem.bounds
+    inside = np.clip(kept, (x0, y0), (x1, y1))
+    inside[[0, -1]] = problem.start, problem.goal
+    return np.asarray(inside)
+
+
+# Discs
+
+
+def _around(space: FreeSpace, points: Array) -> Surroundings | None:
+    """What is around a path, at the largest clearance that the path keeps."""
+    for attempt in range(CLEARANCE_ATTEMPTS):
+        clearance = CLEARANCE * space.bounds.side * 0.1**attempt
+        sides = np.array([_sides_clear_of(points, c, clearance) for c in space.circles], int)
+        around = surroundings(space, clearance, sides)
+        free = np.empty(len(points) - 1, np.uint8)
+        grids.fill_free(around.space, points[:-1], points[1:], free)
+        if free.all():
+            return around
+    return None
+
+
+def _sides_clear_of(points: Array, circle: Circle, clearance: float) -> int:
+    """Sides of the coarsest polygon around a disc that a polyline stays out of."""
+    centre, radius = np.array([circle.x1, circle.x2]), circle.radius
+    ahead, offset = np.diff(points, axis=0), centre - points[:-1]
+    squared = np.maximum((ahead**2).sum(axis=1), 1e-300)
+    within = np.clip((offset * ahead).sum(axis=1) / squared, 0.0, 1.0)
+    nearest = float(np.hypot(*(within[:, None] * ahead - offset).T).min())
+    sides = FEWEST_SIDES
+    while sides < MOST_SIDES and nearest < (radius + clearance) / math.cos(math.pi / sides):
+        sides *= 4
+    return sides
+
+
+def _with_finer_discs(
+    space: FreeSpace, around: Surroundings, band: Band
+) -> tuple[Surroundings, Band] | None:
+    """With four times the sides around the discs that the path bends round, if any can have more.
+
+    A coarse corner is cut into four, which lie behind it; the path is pulled onto them.
+    """
+    band = _pruned(around, band)
+    touched = np.unique(around.discs[band.bends])
+    grown = touched[touched != NONE]
+    grown = grown[around.sides[grown] < MOST_SIDES]
+    if len(grown) == 0:
+        return None
+    sides = around.sides.copy()
+    sides[grown] *= 4
+    finer = surroundings(space, float(around.clearance[0]), sides)
+    plain = int((around.discs[:-1] == NONE).sum())
+    old_first = plain + np.concatenate([[0], np.cumsum(around.sides)])
+    new_first = plain + np.concatenate([[0], np.cumsum(sides)])
+    discs = around.discs[band.bends]
+    factors = np.where(discs != NONE, sides[discs] // around.sides[discs], 1)
+    cut = np.repeat(np.arange(len(discs)), factors)
+    within = np.arange(len(cut)) - np.repeat(np.cumsum(factors) - factors, factors)
+    # A disc to the left is passed from corner to corner in their order.
+    within = np.where(_is_left(around, band)[cut], within, factors[cut] - 1 - within)
+    place = factors[cut] * (band.bends[cut] - old_first[discs[cut]]) + new_first[discs[cut]]
+    bends = np.where(discs[cut] != NONE, place + within, band.bends[cut])
+    wanted = replace(Band.free(band.points[cut]), bends=bends)
+    return finer, _pulled_back(finer, wanted, np.where(discs[cut] != NONE, cut, NONE))
+
+
+def _is_left(around: Surroundings, band: Band) -> npt.NDArray[np.bool_]:
+    """(m,): do the obstacles that the path bends round lie to its left?"""
+    left = np.zeros(len(band.points), bool)
+    off, way = outwards(around, band), band.points[2:] - band.points[:-2]
+    left[1:-1] = way[:, 0] * off[:, 1] - way[:, 1] * off[:, 0] < 0.0
+    return left
+
+
+def _pulled_back(around: Surroundings, band: Band, groups: Indices) -> Band:
+    """With the points in groups (m,) moved to the corners that they are said to be at.
+
+    Every other group moves at a time, so that one that something is in the way of does not
+    keep the others from moving. Its points are free then.
+    """
+    for parity in (0, 1):
+        moving = (groups != NONE) & (np.cumsum(np.diff(groups, prepend=NONE) != 0) % 2 == parity)
+        target = np.where(moving[:, None], around.corners[band.bends], band.points)
+        loose = replace(band, bends=np.where(moving, NONE, band.bends))
+        moved, before = advanced(around, loose, target)
+        groups = np.insert(groups, before, NONE)
+        band = adopted(around, moved)
+    return band
+
+
+def _pruned(around: Surroundings, band: Band) -> Band:
+    """Without the points between two neighbouring corners of a disc's polygon.
+
+    Its sides are so short that the path between them is as good as straight.
+    """
+    held = np.flatnonzero(band.is_held)
+    discs = around.discs[band.bends[held]]
+    same = (discs[:-1] != NONE) & (discs[:-1] == discs[1:])
+    apart = np.abs(np.diff(band.bends[held]))
+    beside = (apart == 1) | (apart == around.sides[discs[:-1]] - 1) if same.any() else same
+    kept = np.ones(len(band.points), bool)
+    for first, last in zip(held[:-1][same & beside], held[1:][same & beside], strict=True):
+        kept[first + 1 : last] = False
+    return band.chosen(kept)
+
+
+# The exact geodesics between the contacts
+
+
+def _stretches(surface: Surface, around: Surroundings, band: Band) -> Iterator[tuple[Band, bool]]:
+    """The band in parts that share their ends, and whether each is a geodesic to be smoothed.
+
+    The others are runs along walls and around discs, straight from point to point.
+    """
+    stops = np.flatnonzero(band.is_held | (band.walls[:, 0] != NONE))
+    first, last = stops[:-1], stops[1:]
+    on_one_wall = (band.walls[first, 0] != NONE) & (band.walls[first, 0] == band.walls[last, 0])
+    discs = np.maximum(around.discs[band.bends], around.wall_discs[band.walls[:, 0]])
+    on_one_disc = (discs[first] != NONE) & (discs[first] == discs[last])
+    sizes = np.hypot(*(band.points[last] - band.points[first]).T)
+    is_short = sizes < STRAIGHT * surface.resolution
+    is_straight = (last - first == 1) & (on_one_wall | on_one_disc | is_short)
+    reached = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(band.points, axis=0).T))])
+    is_straight |= reached[first] == reached[last]
+    begins = np.concatenate([[True], ~(is_straight[1:] & is_straight[:-1])])
+    groups = np.append(first[begins], last[-1])
+    for begin, end, straight in zip(groups[:-1], groups[1:], is_straight[begins], strict=True):
+        yield band.chosen(slice(begin, end + 1)), not straight
+
+
+def _joined(parts: list[Band]) -> Band:
+    """Parts that share their ends, as one band."""
+    kept = [parts[0], *(part.chosen(slice(1, None)) for part in parts[1:])]
+    names = ("points", "bends", "walls")
+    return Band(*(np.concatenate([getattr(part, name) for part in kept]) for name in names))
+
+
+def _smoothed(surface: Surface, around: Surroundings, band: Band) -> Band:
+    """With every stretch between contacts a geodesic to the fourth power of its spacing.
+
+    Where such a stretch meets a corner that the polyline passed by, the path is bent round
+    that, too, and pulled taut again.
+    """
+    for _ in range(SMOOTHING_ROUNDS):
+        parts = [
+            _smoothed_part(surface, around, part) if is_geodesic else part
+            for part, is_geodesic in _stretches(surface, around, band)
+        ]
+        smoothed = _joined(parts)
+        if (smoothed.bends != NONE).sum() == (band.bends != NONE).sum():
+            return smoothed
+        band = tightened(surface, around, smoothed)
+    return band
+
+
+def _smoothed_part(surface: Surface, around: Surroundings, part: Band) -> Band:
+    """A stretch between contacts, moved onto the geodesic between its ends."""
+    pieces = len(part.points) - 1
+    if math.isinf(surface.resolution):
+        target = np.linspace(part.points[0], part.points[-1], pieces + 1)
+        return advanced(around, part, target)[0]
+    if pieces < FEWEST_PIECES:
+        longest = float(np.hypot(*np.diff(part.points, axis=0).T).max())
+        part = subdivided(part, longest * pieces / FEWEST_PIECES)
+    settled = settle(surface, part.points)
+    corrected = correct(surface, settled)
+    return advanced(around, part, settled if corrected is None else corrected)[0]
+
+
+def _laid(surface: Surface, around: Surroundings, band: Band, tolerance: float) -> Array:
+    """Points (m, 2) along the geodesics between contacts."""
+    laid = [band.points[:1]]
+    for part, is_geodesic in _stretches(surface, around, band):
+        points = _laid_part(surface, around, part, tolerance) if is_geodesic else part.points
+        laid.append(points[1:])
+    return np.concatenate(laid)
+
+
+def _laid_part(surface: Surface, around: Surroundings, part: Band, tolerance: float) -> Array:
+    pieces = len(part.points) - 1
+    if pieces < 2:
+        return part.points
+    if math.isinf(surface.resolution):
+        return part.points[[0, -1]]
+    curve = curve_through(part.points)
+    at_vertices = np.linspace(0.0, 1.0, pieces + 1)
+    shares = np.union1d(at_vertices, laid_shares(surface, curve, pieces, tolerance))
+    before = np.column_stack([np.interp(shares, at_vertices, axis) for axis in part.points.T])
+    target = curve(shares)
+    target[[0, -1]] = part.points[[0, -1]]
+    band = Band.free(before)
+    band.bends[[0, -1]] = part.bends[[0, -1]]
+    moved, _ = advanced(around, band, target)
+    met_corner = len(moved.points) > len(target)
+    return part.points if met_corner else moved.points

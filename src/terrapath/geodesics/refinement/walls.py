@@ -1,0 +1,224 @@
+"""The outline of free space: straight walls, and the corners that a taut path bends round.
+
+Obstacles are closed sets, so a path keeps clear of them by a hair: every outline is moved
+outwards by a tiny clearance, and a taut path runs along the moved outline. Discs become
+polygons that hold them, with as many sides as are asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from ..._kernels.geodesics import contacts as kernels
+from ..._kernels.space import free_space as grids
+from ...space.free_space import FreeSpace, Indices, index_grid, listed
+from ...surface import Mask
+from ...validation import Array, Bounds
+
+# Walls stand behind the places where a path touches them by this share of the clearance.
+SLACK = 0.01
+# ... and end before the corners' places by this share.
+SHORTENED = 0.98
+# A mask's cells are widened by free space itself; this share of a cell is beyond that.
+CELL_CLEARANCE = 3e-7
+# A corner turns by more than this, radians.
+LEAST_TURN = 1e-9
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Walls and corners, not yet indexed.
+
+    edges : (e, 4) and normals : (e, 2), towards free ground. clearance : (e,), of each wall.
+    corners : (c, 2), where a path bends. tips : (c, 2), what its segments may not meet.
+    """
+
+    edges: Array
+    normals: Array
+    clearance: Array
+    corners: Array
+    tips: Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[Outline]) -> Outline:
+        """All walls and corners of several outlines, in their order."""
+        names = ("edges", "normals", "clearance", "corners", "tips")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """All that a path can run into.
+
+    corners : (c, 2), where a path bends. clearance : (e,), of each wall. discs : (c + 1,), the disc
+    that a corner belongs to, -1 for none, as the last entry says for no corner at all;
+    wall_discs : (e + 1,), likewise for walls; and sides : (discs,), of the polygon around each.
+    """
+
+    walls: Any
+    space: Any
+    corners: Array
+    clearance: Array
+    discs: Indices
+    wall_discs: Indices
+    sides: Indices
+
+
+def _ring(points: Array, clearance: float) -> Outline:
+    """The outline of a ring (n, 2) with free ground to its right.
+
+    Where it turns by more than a right angle the corner is cut off, so that a spike's corner
+    does not lie far from its tip.
+    """
+    ahead = np.roll(points, -1, axis=0) - points
+    points = points[(ahead != 0.0).any(axis=1)]
+    ahead = np.roll(points, -1, axis=0) - points
+    along = ahead / np.hypot(*ahead.T)[:, None]
+    normals = np.column_stack([along[:, 1], -along[:, 0]])
+    before, normals_before = np.roll(along, 1, axis=0), np.roll(normals, 1, axis=0)
+    cross = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
+    turn = np.arctan2(cross, (before * along).sum(axis=1))
+    turn[turn < LEAST_TURN - math.pi] = math.pi  # the end of a line
+    is_corner = turn > LEAST_TURN
+    is_cut = turn > 0.5 * math.pi + LEAST_TURN
+    reach = np.where(is_corner, np.tan(np.where(is_cut, 0.25, 0.5) * turn), 0.0)
+    arriving = normals_before + reach[:, None] * before
+    leaving = normals - reach[:, None] * along
+    both = np.stack([arriving, leaving], axis=1)
+    chosen = np.column_stack([is_corner, is_cut])
+    outwards = both[chosen]
+    at = np.repeat(points, 2, axis=0).reshape(-1, 2, 2)[chosen]
+    longer = SHORTENED * clearance * reach
+    moved = (1.0 - SLACK) * clearance * normals
+    first = points + moved - longer[:, None] * along
+    last = points + ahead + moved + np.roll(longer, -1)[:, None] * along
+    return Outline(
+        np.hstack([first, last]),
+        normals,
+        np.full(len(points), clearance),
+        at + clearance * outwards,
+        at + (1.0 - SLACK) * clearance * outwards,
+    )
+
+
+def _rings(geometry: BaseGeometry) -> list[Array]:
+    """Rings (n, 2), not closed, with free ground to their right."""
+    if isinstance(geometry, shapely.Polygon):
+        turned = shapely.orient_polygons(geometry)
+        return [shapely.get_coordinates(ring)[:-1] for ring in (turned.exterior, *turned.interiors)]
+    there = shapely.get_coordinates(geometry)
+    return [np.concatenate([there, there[-2:0:-1]])]
+
+
+def _disc(x: float, y: float, radius: float, sides: int) -> Array:
+    """The regular polygon around a disc; with four times the sides it lies in this one."""
+    angles = (np.arange(sides) + 0.5) * (2.0 * math.pi / sides)
+    reach = radius / math.cos(math.pi / sides)
+    return np.column_stack([x + reach * np.cos(angles), y + reach * np.sin(angles)])
+
+
+def _mask(mask: Mask, clearance: float) -> Outline:
+    """The outline of a mask's blocked cells."""
+    dx, dy = mask.spacing
+    clearance += CELL_CLEARANCE * max(dx, dy)
+    blocked = np.pad(mask.blocked, 1)
+    node_x = mask.x[0] - 0.5 * dx + dx * np.arange(mask.blocked.shape[1] + 1)
+    node_y = mask.y[0] - 0.5 * dy + dy * np.arange(mask.blocked.shape[0] + 1)
+    quarters = (blocked[:-1, :-1], blocked[:-1, 1:], blocked[1:, :-1], blocked[1:, 1:])
+    is_corner = np.asarray(sum(quarter.view(np.uint8) for quarter in quarters)) == 1
+    outward = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
+    j, i = np.nonzero(is_corner)
+    outwards = outward[np.argmax([quarter[j, i] for quarter in quarters], axis=0)]
+    corners = np.column_stack([node_x[i], node_y[j]])
+    edges, normals = [], []
+    for below, above, step, normal in (
+        # Walls along x1 with free ground above or below, then along x2 to the right or left.
+        (blocked[:-1, 1:-1], blocked[1:, 1:-1], (0, 1), (0.0, 1.0)),
+        (blocked[1:-1, :-1], blocked[1:-1, 1:], (1, 0), (1.0, 0.0)),
+    ):
+        for walls, way in ((below & ~above, 1.0), (above & ~below, -1.0)):
+            j, i = np.nonzero(walls)
+            first, last = (j, i), (j + step[0], i + step[1])
+            a, b = (np.column_stack([node_x[i], node_y[j]]) for j, i in (first, last))
+            along = (b - a) / np.hypot(*(b - a).T)[:, None]
+            longer = SHORTENED * clearance * along
+            out = way * np.array(normal)
+            a = a + (1.0 - SLACK) * clearance * out - is_corner[first][:, None] * longer
+            b = b + (1.0 - SLACK) * clearance * out + is_corner[last][:, None] * longer
+            edges.append(np.hstack([a, b]))
+            normals.append(np.broadcast_to(out, a.shape))
+    joined = np.concatenate(edges)
+    return Outline(
+        joined,
+        np.concatenate(normals),
+        np.full(len(joined), clearance),
+        corners + clearance * outwards,
+        corners + (1.0 - SLACK) * clearance * outwards,
+    )
+
+
+def _bounds(bounds: Bounds, clearance: float) -> Outline:
+    """The edge of the bounds, which a path may run along exactly."""
+    x0, y0, x1, y1 = bounds
+    slack = SLACK * clearance
+    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    normals = np.array([(0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)])
+    edges = np.hstack([corners, np.roll(corners, -1, axis=0)]) - slack * np.tile(normals, 2)
+    empty = np.empty((0, 2))
+    return Outline(edges, normals, np.full(4, clearance), empty, empty)
+
+
+def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surroundings:
+    """Everything around a path. sides : (discs,), of the polygon around each disc."""
+    parts = [_bounds(space.bounds, clearance)]
+    for geometry in space.geometries:
+        parts += [_ring(ring, clearance) for ring in _rings(geometry)]
+    parts += [_mask(mask, clearance) for mask in space.masks]
+    plain = Outline.joined(parts)
+    for circle, count in zip(space.circles, sides, strict=True):
+        ring = _disc(circle.x1, circle.x2, circle.radius, int(count))
+        parts.append(_ring(ring, clearance))
+    outline = Outline.joined(parts)
+    owners, counts = [*range(-1, len(sides)), -1], [*sides, 1]
+    return Surroundings(
+        *_indexed(space.bounds, outline),
+        outline.corners,
+        outline.clearance,
+        np.repeat(owners, [len(plain.corners), *counts]),
+        np.repeat(owners, [len(plain.edges), *counts]),
+        sides,
+    )
+
+
+def _indexed(bounds: Bounds, outline: Outline) -> tuple[Any, Any]:
+    """Walls for sweeps, and the same walls as a space that segments are tested in."""
+    grid = index_grid(bounds, len(outline.edges))
+    edges = np.ascontiguousarray(outline.edges)
+    tips = np.ascontiguousarray(outline.tips)
+    edge_first, edge_ids = listed(grids.list_edges, grid, edges)
+    corner_first, corner_ids = listed(grids.list_edges, grid, np.hstack([tips, tips]))
+    normals = np.ascontiguousarray(outline.normals)
+    walls = kernels.Walls(
+        grid, edges, normals, edge_first, edge_ids, tips, corner_first, corner_ids
+    )
+    none, nobody = np.zeros(len(edge_first), np.int64), np.empty(0, np.int64)
+    space = grids.Space(
+        grid,
+        edges,
+        edge_first,
+        edge_ids,
+        np.empty((0, 3)),
+        none,
+        nobody,
+        np.empty((0, 4)),
+        np.empty((0, 3), np.int64),
+        np.empty(0, np.uint8),
+    )
+    return walls, space

@@ -1,0 +1,132 @@
+"""Trials in parallel processes, each stored as soon as it is done."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Any
+
+from .._support.watching import Watch, watch_nothing
+from .trials import Result, Store, Trial
+
+# Held while a result is written, so that a worker that is told to end leaves no half file.
+_SAVING = threading.Lock()
+
+
+def _measure_and_save(trial: Trial[Result], store: Store) -> Result:
+    result = trial.measure()
+    with _SAVING:
+        store.save(trial, result)
+    return result
+
+
+def _end_when_closed(lifeline: Connection) -> None:
+    with suppress(EOFError, OSError):
+        lifeline.recv()
+    with _SAVING:
+        os._exit(1)
+
+
+def _prepare_worker(lifeline: Connection) -> None:
+    """Ctrl-C is the parent's to answer; a parent that gives up, or is killed, ends the worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_when_closed, args=(lifeline,), daemon=True).start()
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Ctrl-C waits: a process that is started meanwhile is born deaf to it (POSIX)."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    # Started now, because its start would let Ctrl-C through again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class Runner:
+    """Runs trials, or finds their results in the store.
+
+    workers : processes; with 1 the trials run in this one. Use it as a context manager.
+    A trial that fails, or Ctrl-C, ends the run; what was finished stays stored.
+    """
+
+    def __init__(self, store: Store, workers: int, watch: Watch = watch_nothing) -> None:
+        self.store = store
+        self.workers = workers
+        self.watch = watch
+        self._pool: ProcessPoolExecutor | None = None
+        self._lifeline: Connection | None = None
+
+    def __enter__(self) -> Runner:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._pool is None or self._lifeline is None:
+            return
+        if kind is not None:
+            self._lifeline.close()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+        self._lifeline.close()
+
+    def run(self, stage: str, trials: Sequence[Trial[Result]]) -> list[Result]:
+        """The trials' results, in the trials' order."""
+        found: dict[Trial[Result], Result] = {}
+        missing: dict[Trial[Result], None] = {}
+        for trial in trials:
+            result = self.store.load(trial)
+            if result is None:
+                missing[trial] = None
+            else:
+                found[trial] = result
+        total = len(found) + len(missing)
+        self.watch(stage, len(found), total)
+        for trial, result in self._measure(list(missing)):
+            found[trial] = result
+            self.watch(stage, len(found), total)
+        return [found[trial] for trial in trials]
+
+    def _measure(self, trials: list[Trial[Result]]) -> Iterator[tuple[Trial[Result], Result]]:
+        """Trials with their results, in the order in which they are done."""
+        if self.workers == 1:
+            for trial in trials:
+                yield trial, _measure_and_save(trial, self.store)
+            return
+        if not trials:
+            return
+        with _interrupts_held():
+            pool = self._started_pool()
+            futures: dict[Any, Trial[Result]] = {
+                pool.submit(_measure_and_save, trial, self.store): trial for trial in trials
+            }
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+
+    def _started_pool(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            workers_end, self._lifeline = context.Pipe(duplex=False)
+            self._pool = ProcessPoolExecutor(
+                self.workers,
+                mp_context=context,
+                initializer=_prepare_worker,
+                initargs=(workers_end,),
+            )
+        return self._pool

@@ -1,0 +1,188 @@
+"""What is done with any planner's answer: refine the path, and prove how good it is."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..certificates.certificate import Certificate
+from ..certificates.search import lower_bound
+from ..errors import warn_unfinished
+from ..geodesics.refinement import refine
+from ..problem import Problem, Solution, Status
+from ..validation import require_bool, require_positive
+from .base import INTERRUPT, PROVING, REFINING, Callback, Planner, Progress
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """A planner whose answers are refined and bounded.
+
+    refine : take the path to the locally shortest one. bound : prove a lower bound on every
+    path's length, to a gap of one coarse lattice. target_gap : refine the bound until
+    (length - bound) / bound is met, which asks for a bound. time_limit : seconds for all
+    together, looked at between the lattices of a bound.
+
+    What the planner itself has refined or proven is not done again. An answer that was
+    interrupted is left as it is, and no failure here loses the planner's path.
+    """
+
+    planner: Planner
+    refine: bool = False
+    bound: bool = False
+    target_gap: float | None = None
+    time_limit: float | None = None
+
+    def __post_init__(self) -> None:
+        require_bool(refine=self.refine, bound=self.bound)
+        _require_limits(self.target_gap, self.time_limit)
+
+    @property
+    def name(self) -> str:
+        """The planner's name on the command line."""
+        return self.planner.name
+
+    def _options(self) -> dict[str, Any]:
+        """What was asked for, as far as it says anything; the planner's own word is the last."""
+        own = {name: value for name, value in vars(self.planner).items() if name[0] != "_"}
+        asked = {"refine": self.refine, "bound": self.bound, "target_gap": self.target_gap}
+        return {
+            name: value
+            for options in (asked, own)
+            for name, value in options.items()
+            if value is not None
+        }
+
+    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+        """Plan and finish. ``callback`` sees the progress and may stop the planner or the bound.
+
+        A planner that was stopped by it is finished all the same.
+        """
+        solution = self.planner.solve(problem, callback=callback)
+        solution = replace(solution, options=self._options())
+        return finish(
+            solution,
+            refine=self.refine,
+            bound=self.bound,
+            target_gap=self.target_gap,
+            time_limit=self.time_limit,
+            callback=callback,
+        )
+
+
+def finish(
+    solution: Solution,
+    *,
+    refine: bool = False,
+    bound: bool = False,
+    target_gap: float | None = None,
+    time_limit: float | None = None,
+    callback: Callback | None = None,
+) -> Solution:
+    """A solution refined and bounded as asked; see ``Finished``."""
+    if refine and solution.status is not Status.INTERRUPTED:
+        solution = refined(solution, callback=callback)
+    if (bound or target_gap is not None) and solution.status is not Status.INTERRUPTED:
+        rest = None if time_limit is None else max(time_limit - solution.seconds, 1e-9)
+        solution = bounded(solution, target_gap=target_gap, time_limit=rest, callback=callback)
+    return solution
+
+
+def refined(solution: Solution, *, callback: Callback | None = None) -> Solution:
+    """The same solution with its path taken to the locally shortest one.
+
+    ``cost`` stays what the planner believed; ``unrefined`` is the planner's own path.
+    """
+    problem, given = solution.problem, solution.path
+    if given is None or solution.unrefined is not None or problem.start == problem.goal:
+        return solution
+    started = time.perf_counter()
+    try:
+        _announce(solution, REFINING, callback)
+        path = refine(problem, given)
+    except KeyboardInterrupt:
+        return _interrupted(solution)
+    except Exception as error:
+        warn_unfinished("the path could not be refined and is the planner's own", error)
+        return solution
+    seconds = solution.seconds + time.perf_counter() - started
+    return replace(solution, path=path, unrefined=given, seconds=seconds)
+
+
+def bounded(
+    solution: Solution,
+    *,
+    target_gap: float | None = None,
+    time_limit: float | None = None,
+    callback: Callback | None = None,
+) -> Solution:
+    """The same solution with a proven lower bound on every path's length.
+
+    target_gap : refine the bound until the gap is met. time_limit : seconds. ``callback``
+    sees each bound, and ends its refinement by returning True. Ctrl-C leaves the best that
+    was proven, if any.
+    """
+    _require_limits(target_gap, time_limit)
+    if solution.path is None or _is_proven(solution, target_gap):
+        return solution
+    started, before = time.perf_counter(), solution.seconds
+    best: Certificate | None = None
+
+    def watch(certificate: Certificate) -> bool:
+        nonlocal best
+        best = certificate
+        seen = _progress(solution, PROVING, before + time.perf_counter() - started)
+        seen = seen._replace(lower_bound=float(certificate))
+        return callback is not None and bool(callback(seen))
+
+    try:
+        _announce(solution, PROVING, callback)
+        best = lower_bound(
+            solution.problem,
+            length=solution.path.length,
+            target_gap=target_gap,
+            time_limit=time_limit,
+            watch=watch,
+        )
+    except KeyboardInterrupt:
+        solution = _interrupted(solution)
+    except Exception as error:
+        warn_unfinished("no better bound could be proven", error)
+    solution = replace(solution, seconds=before + time.perf_counter() - started)
+    return solution if best is None else with_certificate(solution, best)
+
+
+def with_certificate(solution: Solution, certificate: Certificate) -> Solution:
+    """The solution with its bound; rounding apart, no bound is above a path's length."""
+    assert solution.length is not None
+    value = min(certificate.value, solution.length)
+    return replace(solution, lower_bound=value, certificate=certificate)
+
+
+def _require_limits(target_gap: float | None, time_limit: float | None) -> None:
+    optional = {"target_gap": target_gap, "time_limit": time_limit}
+    require_positive(**{name: value for name, value in optional.items() if value is not None})
+
+
+def _is_proven(solution: Solution, target_gap: float | None) -> bool:
+    if solution.certificate is None or solution.gap is None:
+        return False
+    return target_gap is None or solution.gap <= target_gap
+
+
+def _interrupted(solution: Solution) -> Solution:
+    return replace(solution, status=Status.INTERRUPTED, stopped_by=INTERRUPT)
+
+
+def _progress(solution: Solution, stage: str, seconds: float) -> Progress:
+    length = math.inf if solution.length is None else solution.length
+    count = solution.samples
+    return Progress(count, count, seconds, length, solution.lower_bound or 0.0, stage)
+
+
+def _announce(solution: Solution, stage: str, callback: Callback | None) -> None:
+    """Tell what begins now; the search is over, so there is nothing to stop yet."""
+    if callback is not None:
+        callback(_progress(solution, stage, solution.seconds))

@@ -1,0 +1,5 @@
+"""What is asked and what is answered: problem, path, solution; and problems by name."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+"""The public application layer: from a question to its answer."""

@@ -1,0 +1,55 @@
+"""All options together: a question to Terrapath."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from .listing import SECTIONS, options
+from .option import STRICT
+from .problem_options import ConstraintsSection, MapSection, RouteSection
+from .solution_options import OutputSection, PlannerSection
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """A question to Terrapath: all that ``terrapath plan`` can be told."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    map: MapSection = field(default_factory=MapSection)
+    route: RouteSection = field(default_factory=RouteSection)
+    constraints: ConstraintsSection = field(default_factory=ConstraintsSection)
+    planner: PlannerSection = field(default_factory=PlannerSection)
+    output: OutputSection = field(default_factory=OutputSection)
+
+    def files(self) -> Iterator[str]:
+        """All files that are named, to be read or written."""
+        yield from self.inputs()
+        yield from self._named("output")
+
+    def inputs(self) -> Iterator[str]:
+        """The files that are named to be read."""
+        yield from self._named(*(name for name in SECTIONS if name != "output"))
+        for table in (*self.map.layers.values(), *self.map.costs.values()):
+            yield table.file
+
+    def _named(self, *sections: str) -> Iterator[str]:
+        for entry in options(*sections):
+            value = getattr(getattr(self, entry.section), entry.key)
+            if entry.option.is_file and value:
+                yield from [value] if isinstance(value, str) else value
+
+    def overridden(self, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
+        """With the values given, by section and key; tables are merged name by name."""
+        changed = {}
+        for name, values in given.items():
+            section = getattr(self, name)
+            merged = {
+                key: {**getattr(section, key), **value} if isinstance(value, dict) else value
+                for key, value in values.items()
+            }
+            changed[name] = dataclasses.replace(section, **merged)
+        return dataclasses.replace(self, **changed)

@@ -1,0 +1,237 @@
+"""Scenario files to begin with: every key with its help, and a route that can be planned."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import re
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, MapError, OutsideSurfaceError
+from ..problem import Problem
+from ..problem.scenes import load, names
+from ..surface import Surface
+from .listing import SECTIONS, Declared, declared, options
+from .problem_options import LayerTable
+
+# Words that name heights in the description of a band.
+HEIGHT_WORDS = ("height", "elevation", "altitude", "dem", "dtm", "dsm", "topograph")
+# What is made of heights and named after them.
+DERIVED_WORDS = ("slope", "aspect", "rough", "shade", "curvature", "error", "count")
+# Guessed ends lie on a grid of so many places a side, from corner to corner.
+PLACES = 9
+WIDTH = 88
+# On a larger map ends are guessed on means of its cells.
+MOST_CELLS = 16_000_000
+
+Values = Mapping[tuple[str, str], str]
+
+
+class Band(NamedTuple):
+    """A band of a raster, as its file describes it."""
+
+    number: int
+    description: str
+    unit: str
+
+    def __str__(self) -> str:
+        unit = f" [{self.unit}]" if self.unit else ""
+        return f"{self.number} {self.description or 'without a description'}{unit}"
+
+
+def scenario_of_scene(name: str) -> str:
+    """The text of a scenario of a built-in scene."""
+    problem = load(name)
+    values = {
+        ("map", "scene"): _text(name),
+        **_ends(problem.surface, (problem.start, problem.goal)),
+    }
+    return _template(values, f"the built-in scene {name}", [])
+
+
+def scenario_of_map(where: str, file: Path, crs: str | None = None) -> str:
+    """The text of a scenario of a raster, to be written into ``file``.
+
+    where : a file, or what GDAL reads under that name. crs : of a raster that names none. Start
+    and goal are guessed: free places far from one another that a way connects.
+    Raises MapError where the raster cannot be read, or has no two such places.
+    """
+    from ..io.maps import count_cells, read_surface
+
+    path = Path(where)
+    if not path.exists() and not path.suffix and ":" not in where:
+        raise InputError(f"{where!r} is neither a built-in scene ({', '.join(names())}) nor a file")
+    bands = _bands(where)
+    height = _height_band(bands)
+    cells = count_cells(where, height_band=height, crs=crs)
+    coarser = math.ceil(math.sqrt(cells / MOST_CELLS)) or 1
+    surface = read_surface(where, height_band=height, crs=crs, decimate=coarser)
+    seen = Path(os.path.relpath(path, file.parent)).as_posix() if path.exists() else where
+    values = {
+        ("map", "path"): _text(seen),
+        ("map", "height_band"): str(height),
+        **_ends(surface, _guess(surface)),
+    }
+    if crs is not None:
+        values["map", "crs"] = _text(crs)
+    return _template(values, path.name, _band_lines(bands, height, seen))
+
+
+def _bands(where: str) -> list[Band]:
+    import rasterio
+    from rasterio.errors import RasterioError
+
+    from ..io.rasters import gdal
+
+    try:
+        with gdal(), rasterio.open(where) as dataset:
+            described = zip(dataset.descriptions, dataset.units, strict=True)
+            return [Band(k, d or "", u or "") for k, (d, u) in enumerate(described, start=1)]
+    except (RasterioError, OSError):
+        return []  # read_surface tells what is wrong with it
+
+
+def _height_band(bands: list[Band]) -> int:
+    """The band that is described as heights, else the first."""
+    for band in bands:
+        said = band.description.lower()
+        is_derived = any(word in said for word in DERIVED_WORDS)
+        if not is_derived and any(word in said for word in HEIGHT_WORDS):
+            return band.number
+    return 1
+
+
+# Start and goal
+
+
+def _guess(surface: Surface) -> tuple[Any, Any]:
+    """Two free places far from one another that a way connects, plane."""
+    bounds = surface.bounds
+    assert bounds is not None
+    along = np.linspace(0.1, 0.9, PLACES)
+    places = [
+        (bounds.x1_min + u * bounds.width, bounds.x2_min + v * bounds.height)
+        for v, u in itertools.product(along, along)
+    ]
+    free = [place for place in (_rounded(surface, p) for p in places) if _is_free(surface, place)]
+    pairs = itertools.combinations(free, 2)
+    for start, goal in sorted(pairs, key=lambda pair: -np.hypot(*np.subtract(*pair))):
+        if not Problem(surface, start, goal).is_unreachable:
+            return start, goal
+    raise MapError("no two free places of the map could be found that a way connects")
+
+
+def _is_free(surface: Surface, place: Any) -> bool:
+    try:
+        Problem(surface, place, place)
+    except (InputError, OutsideSurfaceError):
+        return False
+    return True
+
+
+def _digits(surface: Surface) -> int:
+    """Decimals of the map's own coordinates that tell a hundredth of a cell."""
+    reference = surface.georeference
+    in_degrees = reference is not None and reference.map_crs.is_geographic
+    cell = surface.resolution / (111_000.0 if in_degrees else 1.0)
+    return max(0, int(np.ceil(-np.log10(cell))) + 2)
+
+
+def _rounded(surface: Surface, place: Any) -> Any:
+    """The place on the plane that the scenario's rounded coordinates will name."""
+    reference = surface.georeference
+    if reference is None or reference.is_map_crs:
+        return tuple(np.round(place, _digits(surface)).tolist())
+    rounded = np.round(reference.to_map(np.array(place)), _digits(surface))
+    return tuple(reference.from_map(rounded).tolist())
+
+
+def _ends(surface: Surface, ends: tuple[Any, Any]) -> dict[tuple[str, str], str]:
+    """Start and goal as TOML, in the map's own coordinates."""
+    reference = surface.georeference
+    points = np.array(ends, np.float64)
+    if reference is not None and not reference.is_map_crs:
+        points = reference.to_map(points)
+    start, goal = np.round(points, _digits(surface)).tolist()
+    return {("route", "start"): json.dumps(start), ("route", "goal"): json.dumps(goal)}
+
+
+# Text
+
+
+def _text(value: str) -> str:
+    """TOML's basic strings are JSON's, but for one character."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _template(values: Values, what: str, bands: list[str]) -> str:
+    lines = [
+        f"# Scenario: a route over {what}.",
+        "# Every option of `terrapath plan` stands here. What stands behind # is not given: take",
+        "# away the # to give it. Lengths are in map units.",
+        "# Paths are seen from the folder of this file. Options on the command line count first.",
+    ]
+    for section, kind in SECTIONS.items():
+        lines += ["", "", f"# {kind.__doc__}", f"[{section}]"]
+        entries = list(options(section))
+        plain = [entry for entry in entries if not _is_table(entry)]
+        for entry in plain:
+            lines += ["", *_entry(entry, values.get((section, entry.key)))]
+        for entry in entries:
+            if _is_table(entry):
+                lines += ["", *_table(entry, bands)]
+    return "\n".join(lines) + "\n"
+
+
+def _is_table(entry: Declared) -> bool:
+    return isinstance(entry.default, dict)
+
+
+def _comment(text: str) -> list[str]:
+    return [
+        f"# {line}" for line in textwrap.wrap(" ".join(text.split()), WIDTH, break_on_hyphens=False)
+    ]
+
+
+def _entry(entry: Declared, value: str | None) -> list[str]:
+    help_text = _comment(entry.option.help.replace("; may be repeated", ""))
+    if value is not None:
+        return [*help_text, f"{entry.key} = {value}"]
+    example = entry.option.example or _as_toml(entry.default)
+    return [*help_text, f"# {entry.key} = {example}"]
+
+
+def _as_toml(value: Any) -> str:
+    return json.dumps("" if value is None else value)
+
+
+def _table(entry: Declared, bands: list[str]) -> list[str]:
+    lines = _comment(entry.option.help.replace("; may be repeated", ""))
+    if entry.key == "weights":
+        return [*lines, f"# [{entry.section}.weights]", "# height = 1.0"]
+    if entry.key == "layers" and bands:
+        return [*lines, *bands]
+    return [*lines, *_layer(entry.key, "NAME", "layer.tif", 1)]
+
+
+def _layer(key: str, name: str, file: str, band: int) -> list[str]:
+    shown = {"file": _text(file), "band": str(band), "weight": "1.0"}
+    keys = [f"# {name} = {shown[name]}" for name, *_ in declared(LayerTable)]
+    return [f"# [map.{key}.{name}]", *keys]
+
+
+def _band_lines(bands: list[Band], height: int, file: str) -> list[str]:
+    """The other bands of the map, as layers that can be switched on."""
+    lines = _comment(f"Bands of {file}: {'; '.join(map(str, bands))}.")
+    for band in bands:
+        if band.number != height:
+            name = re.sub(r"[^A-Za-z0-9_-]+", "_", band.description).strip("_")
+            lines += _layer("layers", name or f"band_{band.number}", file, band.number)
+    return lines

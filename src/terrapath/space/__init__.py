@@ -1,0 +1,1 @@
+"""Where a path may go: free space, constraints, slope limit, reachability; the lattice over it."""

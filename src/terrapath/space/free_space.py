@@ -1,0 +1,325 @@
+"""Free space: bounds minus obstacles and no-data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from .._kernels.space import free_space as kernels
+from ..errors import InputError
+from ..surface import Mask
+from ..validation import Array, Bounds, as_array, as_point, require_positive
+from .lattice import Lattice
+from .reachability import separated
+
+# Around two edges or circles a cell keeps the lists short and the index small.
+ITEMS_PER_CELL = 2.0
+MOST_CELLS_A_SIDE = 1024
+
+# Corners of the polygon inside a disc that stands for it where separation is to be proven.
+CORNERS_OF_DISC = 64
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A closed disc that may not be entered, map units."""
+
+    x1: float
+    x2: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        require_positive(radius=self.radius)
+        if not (math.isfinite(self.x1) and math.isfinite(self.x2)):
+            raise InputError(f"the centre ({self.x1}, {self.x2}) of a circle is not finite")
+
+    @property
+    def inscribed(self) -> shapely.Polygon:
+        """A polygon that lies wholly in the disc, rounding allowed for."""
+        # Turned, so that corners of equal discs are not within rounding of one another's sides.
+        angles = 0.1 + np.linspace(0.0, 2.0 * math.pi, CORNERS_OF_DISC, endpoint=False)
+        ring = np.column_stack([np.cos(angles), np.sin(angles)])
+        return shapely.Polygon((self.x1, self.x2) + self.radius * (1.0 - 1e-9) * ring)
+
+
+Obstacle: TypeAlias = BaseGeometry | Circle | Mask
+_Patch: TypeAlias = tuple[Any, npt.NDArray[np.bool_]]
+Indices: TypeAlias = npt.NDArray[np.int64]
+Geometries: TypeAlias = npt.NDArray[np.object_]
+
+
+POINTS = (0, 4)  # shapely's type ids
+POLYGON = 3
+
+
+class Parts(NamedTuple):
+    """Obstacles sorted by what they are; geometries are split into points, lines and polygons."""
+
+    geometries: Geometries  # (m,)
+    owners: Indices  # (m,): the obstacle that each belongs to
+    circles: list[Circle]
+    masks: list[Mask]
+
+
+def sort_obstacles(obstacles: Iterable[Obstacle]) -> Parts:
+    """Obstacles taken apart and checked. Raises InputError with the place of one that is none."""
+    geometries, places = [], []
+    circles, masks = [], []
+    for index, obstacle in enumerate(obstacles):
+        if isinstance(obstacle, Circle):
+            circles.append(obstacle)
+        elif isinstance(obstacle, Mask):
+            masks.append(obstacle)
+        elif isinstance(obstacle, BaseGeometry):
+            geometries.append(obstacle)
+            places.append(index)
+        else:
+            raise InputError(
+                f"obstacles[{index}] is a {type(obstacle).__name__}; "
+                "give shapely geometries, Circle or Mask"
+            )
+    whole, owners = np.array(geometries, np.object_), np.array(places, np.int64)
+    invalid = ~shapely.is_valid(whole)
+    if invalid.any():
+        raise InputError(
+            f"obstacles[{owners[invalid][0]}] is not valid: "
+            f"{shapely.is_valid_reason(whole[invalid][0])}; repair it with shapely.make_valid"
+        )
+    return Parts(*simple_parts(whole, owners), circles, masks)
+
+
+def simple_parts(geometries: Geometries, owners: Indices) -> tuple[Geometries, Indices]:
+    """Points, lines and polygons of geometries, however deep they are nested, none empty."""
+    while (shapely.get_type_id(geometries) > POLYGON).any():
+        geometries, which = shapely.get_parts(geometries, return_index=True)
+        owners = owners[which]
+    kept = ~shapely.is_empty(geometries)
+    return geometries[kept], owners[kept]
+
+
+def _refuse_points(parts: Parts) -> None:
+    without_width = np.isin(shapely.get_type_id(parts.geometries), POINTS)
+    if without_width.any():
+        raise InputError(
+            f"obstacles[{parts.owners[without_width][0]}] holds a Point, which has no width to "
+            "avoid; give the problem a radius, or the point a width with buffer(radius)"
+        )
+
+
+def outlines(geometries: Geometries) -> tuple[Geometries, Indices]:
+    """The rings of polygons, and other parts themselves, in their order; whose each of them is."""
+    rings, owners = shapely.get_rings(geometries, return_index=True)
+    is_other = shapely.get_type_id(geometries) != POLYGON
+    owners = np.concatenate([owners, np.flatnonzero(is_other)])
+    order = np.argsort(owners, kind="stable")
+    return np.concatenate([rings, geometries[is_other]])[order], owners[order]
+
+
+def _edges(geometries: Geometries) -> Array:
+    """Boundary edges (m, 4) of polygons with their holes, and of lines."""
+    corners, line = shapely.get_coordinates(outlines(geometries)[0], return_index=True)
+    edges = np.hstack([corners[:-1], corners[1:]])
+    return np.asarray(edges[line[1:] == line[:-1]].reshape(-1, 4))
+
+
+def index_grid(bounds: Bounds, items: int) -> kernels.Grid:
+    """Cells over the bounds, for so many items to be listed in."""
+    side = max(1, min(int(math.sqrt(items / ITEMS_PER_CELL)), MOST_CELLS_A_SIDE))
+    step = (bounds.width / side, bounds.height / side)
+    return kernels.Grid(bounds.x1_min, bounds.x2_min, *step, side, side)
+
+
+def listed(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
+    """Which items each cell of the grid holds: (first, ids) as in ``Space``."""
+    counts = np.zeros(grid.nx * grid.ny + 1, np.int64)
+    if len(items) == 0:  # the kernel need not even be compiled
+        return counts, np.empty(0, np.int64)
+    lister(grid, items, counts, np.empty(0, np.int64))
+    first = np.cumsum(counts)
+    ids = np.empty(first[-1], np.int64)
+    lister(grid, items, first[:-1].copy(), ids)
+    return first, ids
+
+
+class FreeSpace:
+    """Where a path may go: inside the bounds, touching no obstacle.
+
+    obstacles : shapely polygons (with holes) and lines, ``Circle`` and ``Mask``. All are
+    closed sets: a path may not even touch them, so ``shapely`` finds it disjoint from them.
+    """
+
+    def __init__(self, bounds: Bounds, obstacles: Iterable[Obstacle] = ()) -> None:
+        self.bounds = bounds
+        parts = sort_obstacles(obstacles)
+        _refuse_points(parts)
+        self.geometries: list[BaseGeometry] = list(parts.geometries)
+        self.circles = parts.circles
+        self.masks = parts.masks
+        self._geometries = parts.geometries
+        shapely.prepare(self._geometries)
+        self.data = self._index()
+
+    def _index(self) -> kernels.Space:
+        edges = _edges(self._geometries)
+        circles = np.array([[c.x1, c.x2, c.radius] for c in self.circles]).reshape(-1, 3)
+        grid = index_grid(self.bounds, len(edges) + len(circles))
+        edge_first, edge_ids = listed(kernels.list_edges, grid, edges)
+        circle_first, circle_ids = listed(kernels.list_circles, grid, circles)
+        frames, shapes, blocked = _stack_masks(self.masks)
+        return kernels.Space(
+            grid,
+            np.ascontiguousarray(edges),
+            edge_first,
+            edge_ids,
+            circles,
+            circle_first,
+            circle_ids,
+            frames,
+            shapes,
+            blocked,
+        )
+
+    @property
+    def has_obstacles(self) -> bool:
+        """Is there anything to avoid within the bounds?"""
+        return bool(self.geometries or self.circles or self.masks)
+
+    def blocker(self, point: tuple[float, float]) -> str | None:
+        """What makes a point not free, in words; None where it is free."""
+        if not self.bounds.contains(np.array(point)):
+            return f"outside the bounds {self.bounds}"
+        return self._obstacle_at(point) if self.has_obstacles else None
+
+    def _obstacle_at(self, point: tuple[float, float]) -> str | None:
+        """What obstacle makes a point not free, in words."""
+        masks = range(len(self.masks))
+        if any(kernels.mask_is_hit(self.data, mask, *point, *point) for mask in masks):
+            return "in a blocked or no-data cell"
+        if shapely.intersects_xy(self._geometries, *point).any():
+            return "inside an obstacle"
+        discs = ((circle.x1, circle.x2, circle.radius) for circle in self.circles)
+        if any(kernels.may_enter_circle(*point, *point, *disc) for disc in discs):
+            return "inside a circular obstacle"
+        # The kernel's own answer: a point that it takes for a touch could never be left.
+        if not kernels.segment_is_free(self.data, *point, *point):
+            return "on the edge of an obstacle"
+        return None
+
+    def segments_are_free(self, a: Any, b: Any) -> npt.NDArray[np.bool_]:
+        """Do the closed segments a-b, each (m, 2), touch nothing? One end must be free.
+
+        In doubt, within rounding of a touch, the answer is no.
+        """
+        start, end = as_array(a, "a", shape=(None, 2)), as_array(b, "b", shape=(None, 2))
+        if len(start) != len(end):
+            raise InputError(f"a has {len(start)} points and b {len(end)}; give as many of both")
+        if not self.has_obstacles:
+            return np.ones(len(start), bool)
+        free = np.empty(len(start), np.uint8)
+        kernels.fill_free(self.data, start, end, free)
+        return free.astype(bool)
+
+    def covered_cells(self, lattice: Lattice) -> npt.NDArray[np.bool_]:
+        """Cells (ny - 1, nx - 1) of a lattice that lie wholly inside one obstacle. In doubt, no."""
+        covered = np.zeros((lattice.ny - 1, lattice.nx - 1), bool)
+        for mask in self.masks:
+            covered |= _covered_by_mask(mask, lattice)
+        large = self._geometries[_may_cover(self._geometries, lattice)]
+        patches = [_covered_by_geometry(geometry, lattice) for geometry in large]
+        patches += [_covered_by_disc(circle, lattice) for circle in self.circles]
+        for window, inside in patches:
+            covered[window] |= inside
+        return covered
+
+    def separates(self, a: tuple[float, float], b: tuple[float, float]) -> bool:
+        """Is it proven that no path in free space leads from a to b?
+
+        a, b : (x1, x2), map units, in free space. False where a path exists, and where none may
+        but floating point leaves a doubt: a gap or a touch within rounding.
+        Raises InputError where a or b is not free.
+        """
+        for name, point in (("a", as_point(a, "a")), ("b", as_point(b, "b"))):
+            if blocker := self.blocker(point):
+                raise InputError(f"{name}=({point[0]:.10g}, {point[1]:.10g}) is {blocker}")
+        discs = np.array([circle.inscribed for circle in self.circles], np.object_)
+        walls, _ = outlines(np.concatenate([self._geometries, discs]))
+        return separated(self.bounds, self.data, self.masks, walls, a, b)
+
+
+def _may_cover(geometries: Geometries, lattice: Lattice) -> npt.NDArray[np.bool_]:
+    """Which are polygons that are large enough to cover a cell?"""
+    west, south, east, north = shapely.bounds(geometries).reshape(-1, 4).T
+    slack = 1.0 - 1e-9
+    is_large = (east - west >= slack * lattice.dx) & (north - south >= slack * lattice.dy)
+    return np.asarray(is_large & (shapely.get_type_id(geometries) == POLYGON))
+
+
+def _covered_by_geometry(polygon: BaseGeometry, lattice: Lattice) -> _Patch:
+    """Cells around a polygon that it covers."""
+    window, low, high = _cells_near(lattice, polygon.bounds)
+    boxes = shapely.box(low[..., 0], low[..., 1], high[..., 0], high[..., 1])
+    return window, np.asarray(shapely.covers(polygon, boxes), bool).reshape(low.shape[:2])
+
+
+def _covered_by_disc(circle: Circle, lattice: Lattice) -> _Patch:
+    """Cells around a disc whose four corners lie in it."""
+    x, y, r = circle.x1, circle.x2, circle.radius
+    window, low, high = _cells_near(lattice, (x - r, y - r, x + r, y + r))
+    reach = np.maximum(np.abs(low - (x, y)), np.abs(high - (x, y)))
+    return window, np.asarray(np.hypot(reach[..., 0], reach[..., 1]) <= r * (1.0 - 1e-12))
+
+
+def _covered_by_mask(mask: Mask, lattice: Lattice) -> npt.NDArray[np.bool_]:
+    """Cells all of whose ground is blocked by the mask."""
+    dx, dy = mask.spacing
+    columns = _mask_spans(lattice.x, mask.x[0] - 0.5 * dx, dx, len(mask.x))
+    rows = _mask_spans(lattice.y, mask.y[0] - 0.5 * dy, dy, len(mask.y))
+    sums = np.zeros((len(mask.y) + 1, len(mask.x) + 1), np.int64)
+    sums[1:, 1:] = mask.blocked.cumsum(0).cumsum(1)
+    (j0, j1, in_rows), (i0, i1, in_columns) = rows, columns
+    j0, j1, in_rows = j0[:, None], j1[:, None], in_rows[:, None]
+    blocked = sums[j1, i1] - sums[j0, i1] - sums[j1, i0] + sums[j0, i0]
+    return np.asarray((blocked == (j1 - j0) * (i1 - i0)) & in_rows & in_columns)
+
+
+def _mask_spans(nodes: Array, origin: float, step: float, count: int) -> tuple[Any, Any, Any]:
+    """First and one past the last mask cell that each cell of an axis touches; is it within?"""
+    first = np.floor((nodes[:-1] - origin) / step - 1e-9).astype(np.int64)
+    last = np.ceil((nodes[1:] - origin) / step + 1e-9).astype(np.int64)
+    return np.clip(first, 0, count), np.clip(last, 0, count), (first >= 0) & (last <= count)
+
+
+def _cells_near(
+    lattice: Lattice, bounds: tuple[float, float, float, float]
+) -> tuple[Any, Array, Array]:
+    """The window of cells that meet a rectangle, and their lower and upper corners."""
+    columns = np.searchsorted(lattice.x, (bounds[0], bounds[2]))
+    rows = np.searchsorted(lattice.y, (bounds[1], bounds[3]))
+    i = np.arange(max(columns[0] - 1, 0), min(columns[1], lattice.nx - 1))
+    j = np.arange(max(rows[0] - 1, 0), min(rows[1], lattice.ny - 1))
+    low = np.stack(np.meshgrid(lattice.x[i], lattice.y[j]), axis=-1)
+    high = np.stack(np.meshgrid(lattice.x[i + 1], lattice.y[j + 1]), axis=-1)
+    return np.ix_(j, i), low, high
+
+
+def _stack_masks(masks: Sequence[Mask]) -> tuple[Array, Any, Any]:
+    """Masks behind one another, as ``Space`` holds them."""
+    frames, shapes, cells, offset = [], [], [], 0
+    for mask in masks:
+        dx, dy = mask.spacing
+        frames.append([mask.x[0] - 0.5 * dx, mask.y[0] - 0.5 * dy, dx, dy])
+        shapes.append([mask.blocked.shape[1], mask.blocked.shape[0], offset])
+        cells.append(mask.blocked.ravel().astype(np.uint8))
+        offset += mask.blocked.size
+    return (
+        np.array(frames, np.float64).reshape(-1, 4),
+        np.array(shapes, np.int64).reshape(-1, 3),
+        np.concatenate([np.empty(0, np.uint8), *cells]),
+    )

@@ -1,0 +1,85 @@
+"""A rectangular lattice of nodes over a region: where grid planners put their vertices."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .._kernels.space.free_space import Grid
+from ..errors import InputError
+from ..validation import Array, Bounds, require_positive
+
+# The default spacing of the nodes is this share of the region's longer side, or less where the
+# surface has finer features, but never less than the other one.
+NODES_PER_SIDE, MOST_NODES_PER_SIDE = 250.0, 1000.0
+
+# Nodes that can be numbered by 32 bits, and fit in the memory of a large machine.
+MOST_NODES = 2**30
+
+
+def default_spacing(bounds: Bounds, resolution: float) -> float:
+    """A spacing of nodes that suits a region with features of a resolution, map units."""
+    side = max(bounds.width, bounds.height)
+    return max(min(side / NODES_PER_SIDE, resolution), side / MOST_NODES_PER_SIDE)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """nx times ny nodes, the outermost on the edge of the bounds."""
+
+    bounds: Bounds
+    nx: int
+    ny: int
+
+    @classmethod
+    def spanning(cls, bounds: Bounds, spacing: float) -> Lattice:
+        """The lattice with the fewest nodes that are at most ``spacing`` map units apart.
+
+        Raises InputError where that is more nodes than can be numbered.
+        """
+        require_positive(spacing=spacing)
+        if max(bounds.width, bounds.height) / spacing > MOST_NODES:
+            raise InputError(
+                f"spacing={spacing:g} makes more than {MOST_NODES:,} nodes; give a wider one"
+            )
+        nx = max(math.ceil(bounds.width / spacing - 1e-9), 1) + 1
+        ny = max(math.ceil(bounds.height / spacing - 1e-9), 1) + 1
+        if nx * ny > MOST_NODES:
+            raise InputError(
+                f"spacing={spacing:g} makes {nx:,} x {ny:,} nodes, more than {MOST_NODES:,}; "
+                "give a wider one"
+            )
+        return cls(bounds, nx, ny)
+
+    @property
+    def dx(self) -> float:
+        """Distance of neighbouring nodes along x1, map units."""
+        return self.bounds.width / (self.nx - 1)
+
+    @property
+    def dy(self) -> float:
+        """Distance of neighbouring nodes along x2, map units."""
+        return self.bounds.height / (self.ny - 1)
+
+    @cached_property
+    def x(self) -> Array:
+        """(nx,), map units."""
+        return np.linspace(self.bounds.x1_min, self.bounds.x1_max, self.nx)
+
+    @cached_property
+    def y(self) -> Array:
+        """(ny,), map units."""
+        return np.linspace(self.bounds.x2_min, self.bounds.x2_max, self.ny)
+
+    @property
+    def points(self) -> Array:
+        """(ny, nx, 2): every node, map units."""
+        return np.stack(np.meshgrid(self.x, self.y), axis=-1)
+
+    @property
+    def data(self) -> Grid:
+        """As kernels read it: node (i, j) lies at (x0 + i dx, y0 + j dy)."""
+        return Grid(self.bounds.x1_min, self.bounds.x2_min, self.dx, self.dy, self.nx, self.ny)

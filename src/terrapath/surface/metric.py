@@ -1,0 +1,113 @@
+"""The metric h on the plane, and the lengths it gives to segments and curves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .._kernels.surface import lengths
+from .._kernels.surface.surfaces import fill_metric
+from ..errors import InputError
+from ..validation import Array, as_points
+from . import Surface
+
+# Relative tolerance of a true length; what is promised is 1e-9.
+QUADRATURE_TOLERANCE = 1e-12
+
+# The 7-point rule is first laid over pieces this many features of the surface long.
+FEATURES_PER_PIECE = 4.0
+
+
+def metric_tensor(surface: Surface, points: Any) -> Array:
+    """The metric h = c^2 (I + sum_k w_k^2 grad x_k grad x_k^T); c is the cost, 1 without costs.
+
+    points : (..., 2), map units. Returns (..., 2, 2), without unit.
+    Raises OutsideSurfaceError where a point is off the surface. Source: paper, section 3.2.
+    """
+    flat, shape = surface._points(points)
+    tensors = np.empty((len(flat), 2, 2))
+    fill_metric(surface.data, flat, tensors)
+    return tensors.reshape(*shape, 2, 2)
+
+
+def determinant(surface: Surface, points: Any) -> Array:
+    """The determinant d = det h, the squared ratio of area on the surface to area on the plane.
+
+    With costs it is times c^4. points : (..., 2), map units. Returns (...), without unit.
+    Source: paper, section 3.2.
+    """
+    h = metric_tensor(surface, points)
+    return np.asarray(h[..., 0, 0] * h[..., 1, 1] - h[..., 0, 1] ** 2)
+
+
+def inverse_metric_tensor(surface: Surface, points: Any) -> Array:
+    """The inverse h^-1, from the adjugate of h over d. With costs it is times c^-2.
+
+    points : (..., 2), map units. Returns (..., 2, 2), without unit. Source: paper, section 3.2.
+    """
+    h = metric_tensor(surface, points)
+    d = h[..., 0, 0] * h[..., 1, 1] - h[..., 0, 1] ** 2
+    adjugate = np.empty_like(h)
+    adjugate[..., 0, 0], adjugate[..., 1, 1] = h[..., 1, 1], h[..., 0, 0]
+    adjugate[..., 0, 1] = adjugate[..., 1, 0] = -h[..., 0, 1]
+    return np.asarray(adjugate / d[..., None, None])
+
+
+def _measure(kernel: Any, surface: Surface, a: Any, b: Any, *options: float) -> Array:
+    """Run a kernel over segments a-b, each (..., 2), broadcast against one another."""
+    start, end = as_points(a, "a"), as_points(b, "b")
+    try:
+        start, end = np.broadcast_arrays(start, end)
+    except ValueError:
+        raise InputError(
+            f"a has shape {start.shape} and b {end.shape}; they do not fit one another"
+        ) from None
+    flat_start, shape = surface._points(start)
+    flat_end, _ = surface._points(end)
+    measured = np.empty(len(flat_start))
+    kernel(surface.data, flat_start, flat_end, *options, measured)
+    return measured.reshape(shape)
+
+
+def line_r(surface: Surface, a: Any, b: Any) -> Array:
+    """Length of the segments a-b under h by the 5-point Newton-Cotes (Boole) rule.
+
+    a, b : (..., 2), map units. Returns (...), map units; exact for integrands of degree 5,
+    and an estimate, which can fall below the truth, for others. Source: paper, Algorithm 1.
+    """
+    return _measure(lengths.fill_line_r, surface, a, b)
+
+
+def chord(surface: Surface, a: Any, b: Any) -> Array:
+    """Euclidean distance in R^n between lifted points: a lower bound of every path's length.
+
+    a, b : (..., 2), map units. Returns (...), map units.
+    """
+    return _measure(lengths.fill_chords, surface, a, b)
+
+
+def chord_through(surface: Surface, points: Any) -> float:
+    """A lower bound of every path through points (m, 2), in their order: their chords' sum."""
+    array = as_points(points)
+    return float(chord(surface, array[:-1], array[1:]).sum())
+
+
+def segment_lengths(surface: Surface, a: Any, b: Any) -> Array:
+    """True lengths of the segments a-b under h, by adaptive quadrature to 1e-9 relative.
+
+    a, b : (..., 2), map units. Returns (...), map units. Source: paper, equation (3).
+    """
+    longest = FEATURES_PER_PIECE * surface.resolution
+    return _measure(lengths.fill_segment_lengths, surface, a, b, longest, QUADRATURE_TOLERANCE)
+
+
+def curve_length(surface: Surface, points: Any) -> float:
+    """True length under h of the polyline through points (m, 2), map units.
+
+    The same as the length of the lifted curve in R^n. Source: paper, equation (3).
+    """
+    array = as_points(points)
+    if array.ndim != 2 or len(array) < 2:
+        raise InputError(f"points has shape {array.shape}; a curve needs (m, 2) with m >= 2")
+    return float(segment_lengths(surface, array[:-1], array[1:]).sum())
