@@ -12,7 +12,6 @@ from terrapath._support.watching import Watch
 from terrapath.cli.main import run
 from terrapath.cli.resumable import run_resumable
 
-
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 

@@ -102,8 +102,8 @@ def marching_lines(data: MarchData) -> list[str]:
     header = ["scene", "nodes a side", "stencils", "dependents", "march", "in all", "scikit-fmm"]
     header += ["ratio", "error at the goal", "error of HFM", "bytes a node", "GB in all"]
     return [
-        "The distance field of h from the start, second order, in seconds; dependents are the lists "
-        "of which nodes read which. Each lattice has a process of its own, warm. Memory is the "
+        "The distance field of h from the start, second order, in seconds; dependents are the "
+        "lists of which nodes read which. Each lattice has a process of its own, warm. Memory is the "
         "process's peak, and for a node what that is above the peak before.",
         "",
         peer,

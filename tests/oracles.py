@@ -12,7 +12,7 @@ import sympy
 from scipy.integrate import quad, solve_bvp, solve_ivp
 
 from terrapath import FreeSpace
-from terrapath.validation import Bounds
+from terrapath.surface.bounds import Bounds
 
 # Surfaces and the metric
 

@@ -1585,7 +1585,7 @@ def test_what_overflows_proves_nothing():
 TINY = """
 import json
 import terrapath as tp
-from terrapath.bounding import Search
+from terrapath.certificates.search import Search
 from terrapath.lattice import Lattice
 surface = tp.Surface.from_peaks([[(3.0, 0.5, 5.0, 5.0)], [(1.0, 0.2, 2.0, 7.0)]])
 problem = tp.Problem(surface, (1.0, 1.0), (9.0, 8.0), (0.0, 0.0, 10.0, 10.0), [tp.Circle(5, 2, 1)])

@@ -17,7 +17,7 @@ import terrapath as tp
 from oracles import boxes_of_mask
 from terrapath.space.constraints import inflated
 from terrapath.space.slope_limit import Steepness
-from terrapath.validation import Bounds
+from terrapath.surface.bounds import Bounds
 
 SIDE = 10.0
 BOUNDS = (0.0, 0.0, SIDE, SIDE)
@@ -229,7 +229,7 @@ def test_large_masks_grow_in_parts_as_they_do_at_once(monkeypatch):
     mask = tp.Mask(random.random((120, 120)) < 0.003, axis, axis)
     bounds = Bounds(0, 0, 119, 119)
     (whole,) = inflated([mask], 5.5, bounds)
-    monkeypatch.setattr("terrapath.clearance.MOST_CELLS_AT_ONCE", 120)
+    monkeypatch.setattr("terrapath.space.constraints.MOST_CELLS_AT_ONCE", 120)
     (parts,) = inflated([mask], 5.5, bounds)
     assert (whole.blocked == parts.blocked).all()
     assert 0.1 < whole.blocked.mean() < 0.9

@@ -16,7 +16,7 @@ from planner_oracles import visibility_length
 from terrapath.distance.field import Medium
 from terrapath.distance.source import model_source
 from terrapath.problem import scenes
-from terrapath.validation import Bounds
+from terrapath.surface.bounds import Bounds
 
 FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
 REGION = (-1.0, -1.0, 11.0, 11.0)

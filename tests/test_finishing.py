@@ -8,10 +8,10 @@ import pytest
 import shapely
 
 import terrapath as tp
+from terrapath.errors import UnfinishedWarning
 from terrapath.planners import (
     PLANNERS,
     Finished,
-    UnfinishedWarning,
     finish,
     finished,
     make_finished,
@@ -204,7 +204,7 @@ def test_the_options_tell_the_target_gap_of_the_finishing(problem):
 
 
 def test_optimal_says_when_the_finest_lattice_was_not_enough(problem, monkeypatch):
-    monkeypatch.setattr("terrapath.bounding.SIDES", (40, 60))
+    monkeypatch.setattr("terrapath.certificates.search.SIDES", (40, 60))
     solution = tp.Optimal(target_gap=1e-9).solve(problem)
     assert solution.stopped_by == "finest lattice"
     assert solution.status is tp.Status.SOLVED

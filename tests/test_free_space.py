@@ -16,7 +16,7 @@ from oracles import (
     segment_is_free_by_shapely,
 )
 from terrapath.space.free_space import index_grid
-from terrapath.validation import Bounds
+from terrapath.surface.bounds import Bounds
 
 BOUNDS = Bounds(-1.0, -1.0, 11.0, 11.0)
 DOUBT = 1e-6  # nearer than this the kernel may say "blocked"

@@ -38,7 +38,7 @@ from terrapath.geodesics.rays import (
 )
 from terrapath.problem import scenes
 from terrapath.surface import metric
-from terrapath.validation import Bounds
+from terrapath.surface.bounds import Bounds
 
 REGION = Bounds(*scenes.REGION)
 WIDE = Bounds(-100.0, -100.0, 100.0, 100.0)

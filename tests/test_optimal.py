@@ -7,8 +7,8 @@ import pytest
 import shapely
 
 import terrapath as tp
+from terrapath.errors import UnfinishedWarning
 from terrapath.geodesics import alternatives
-from terrapath.planners import UnfinishedWarning
 from terrapath.problem import scenes
 
 START, GOAL, REGION = (0.0, 0.0), (10.0, 10.0), (-1.0, -1.0, 11.0, 11.0)

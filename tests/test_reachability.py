@@ -11,7 +11,7 @@ from scipy import ndimage
 
 import terrapath as tp
 from terrapath.planners import PLANNERS
-from terrapath.validation import Bounds
+from terrapath.surface.bounds import Bounds
 
 SIDE = 10.0
 BOUNDS = Bounds(0.0, 0.0, SIDE, SIDE)
@@ -159,7 +159,7 @@ def test_a_point_that_is_not_free_is_refused(place):
 
 def test_more_walls_than_can_be_looked_at_prove_nothing(monkeypatch):
     assert separates([WALL])
-    monkeypatch.setattr("terrapath.separation.MOST_CORNERS", 4)
+    monkeypatch.setattr("terrapath.space.reachability.MOST_CORNERS", 4)
     assert not separates([WALL])
 
 

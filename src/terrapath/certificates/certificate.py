@@ -18,7 +18,8 @@ import numpy as np
 from .._support.files import written_whole
 from ..errors import CertificateError, MapError
 from ..problem import Problem
-from ..validation import as_array, as_bounds
+from ..surface.bounds import as_bounds
+from ..validation import as_array
 from .claims import Claim, Core, Needs, proven_claim, require_proven, require_sound
 
 

@@ -20,8 +20,9 @@ from .._kernels.surface.surfaces import Spline, fill_values
 from ..errors import CertificateError
 from ..problem import Problem
 from ..space.lattice import Lattice
+from ..surface.bounds import Bounds
 from ..surface.costs import span_within
-from ..validation import Array, Bounds
+from ..validation import Array
 
 # Far above the rounding of the checker's own arithmetic, far below any gap.
 ROUNDING = 1e-9

@@ -22,7 +22,8 @@ from ..distance.field import Medium, march_from
 from ..distance.source import model_source, near_distance, window_radius
 from ..problem import Problem
 from ..space.lattice import Lattice
-from ..validation import Array, Bounds, require_positive
+from ..surface.bounds import Bounds
+from ..validation import Array, require_positive
 from .certificate import Certificate, certify
 from .claims import Claim, Core, Needs, cell_needs
 

@@ -13,8 +13,9 @@ from .._kernels.geodesics import equation as kernels
 from .._kernels.geodesics import rays
 from ..errors import InputError
 from ..surface import Surface
+from ..surface.bounds import Bounds
 from ..surface.metric import inverse_metric_tensor, metric_tensor
-from ..validation import Array, Bounds, as_array, as_point, require_positive
+from ..validation import Array, as_array, as_point, require_positive
 
 # Largest error of a step: of positions as a share of two features of the surface (1 in the
 # paper's scenes), of the unit speed, and of the Jacobi field relative to itself.

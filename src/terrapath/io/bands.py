@@ -12,8 +12,9 @@ import numpy as np
 
 from ..errors import MapError
 from ..surface.blocks import BLOCK
+from ..surface.bounds import Bounds
 from ..surface.grid import Grid
-from ..validation import Array, Bounds
+from ..validation import Array
 
 MARGIN = 8  # cells around a window: what lies beyond moves the spline by 1e-4 of itself
 SAMPLED_STRIPS = 8

@@ -16,12 +16,13 @@ from pyproj import CRS
 from ..errors import InputError, MapError
 from ..surface import Surface
 from ..surface.blocks import blocks
+from ..surface.bounds import as_bounds
 from ..surface.georeference import Georeference, metres_of, parse_crs
 from ..surface.grid import Grid
 from ..surface.raster import Raster
 from ..surface.resampling import require_overlap, resample
 from ..surface.smoothing import quantisation_step, scale_for_step
-from ..validation import Array, as_bounds, require_count, require_not_negative
+from ..validation import Array, require_count, require_not_negative
 from .arrays import band_of_numpy, band_of_xarray, is_xarray
 from .bands import Band, View
 from .rasters import classic_netcdf, gdal, open_band, open_classic_netcdf, reading

@@ -1,10 +1,8 @@
 from . import scenes as scenes
-from .problem import (
-    History as History,
-    Path as Path,
-    Problem as Problem,
-    Profile as Profile,
-    SearchTree as SearchTree,
-    Solution as Solution,
-    Status as Status,
-)
+from .path import Path as Path
+from .path import Profile as Profile
+from .problem import Problem as Problem
+from .solution import History as History
+from .solution import SearchTree as SearchTree
+from .solution import Solution as Solution
+from .solution import Status as Status

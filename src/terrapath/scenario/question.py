@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..planners.corridor import Corridor, Part
     from ..problem import Problem
     from ..surface import Surface
-    from ..validation import Bounds
+    from ..surface.bounds import Bounds
 
 
 def is_scenario(where: str) -> bool:
@@ -277,7 +277,7 @@ def _inside(surface: Surface, place: Point, point: Point, name: str, remedy: str
 
 def _region(surface: Surface, rectangle: Rectangle) -> Bounds:
     """A rectangle of the map's own coordinates on the plane; what is off the map is cut off."""
-    from ..validation import Bounds, as_bounds
+    from ..surface.bounds import Bounds, as_bounds
 
     asked, whole, reference = as_bounds(rectangle), surface.bounds, surface.georeference
     around = asked

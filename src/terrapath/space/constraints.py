@@ -18,7 +18,8 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import InputError
 from ..surface import Mask
-from ..validation import Array, Bounds
+from ..surface.bounds import Bounds
+from ..validation import Array
 from .free_space import POINTS, Circle, FreeSpace, Geometries, Obstacle, sort_obstacles
 from .reachability import merged_masks
 from .slope_limit import Steepness

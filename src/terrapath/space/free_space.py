@@ -15,7 +15,8 @@ from shapely.geometry.base import BaseGeometry
 from .._kernels.space import free_space as kernels
 from ..errors import InputError
 from ..surface import Mask
-from ..validation import Array, Bounds, as_array, as_point, require_positive
+from ..surface.bounds import Bounds
+from ..validation import Array, as_array, as_point, require_positive
 from .lattice import Lattice
 from .reachability import separated
 

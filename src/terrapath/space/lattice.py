@@ -10,7 +10,8 @@ import numpy as np
 
 from .._kernels.space.free_space import Grid
 from ..errors import InputError
-from ..validation import Array, Bounds, require_positive
+from ..surface.bounds import Bounds
+from ..validation import Array, require_positive
 
 # The default spacing of the nodes is this share of the region's longer side, or less where the
 # surface has finer features, but never less than the other one.

@@ -17,7 +17,8 @@ import shapely
 
 from .._kernels.space import free_space as kernels
 from ..surface import Mask
-from ..validation import Array, Bounds
+from ..surface.bounds import Bounds
+from ..validation import Array
 from .lattice import Lattice
 
 Point: TypeAlias = tuple[float, float]

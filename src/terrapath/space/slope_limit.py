@@ -13,8 +13,9 @@ import numpy as np
 from .._kernels.surface.surfaces import Spline
 from ..errors import InputError
 from ..surface import Mask, Surface
+from ..surface.bounds import Bounds
 from ..surface.georeference import metres_of
-from ..validation import Array, Bounds
+from ..validation import Array
 
 # A cell is looked at in four by four steps: at five places along each side.
 STEPS = 4

@@ -10,7 +10,8 @@ import numpy as np
 
 from .._kernels.surface.surfaces import Peaks, Spline
 from ..errors import InputError
-from ..validation import Array, Bounds
+from ..validation import Array
+from .bounds import Bounds
 
 
 def require_costs(values: Array, x: Array, y: Array, names: Sequence[str]) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 
 from .._kernels.surface.surfaces import Spline, fill_jets, fill_values
 from ..errors import FitError, InputError
-from ..validation import Array, Bounds
+from ..validation import Array
 from .blocks import blocks
+from .bounds import Bounds
 from .mask import uniform_spacing
 from .smoothing import FEATURES_PER_SCALE, ChangeMeter, Smoothing, smooth, smooth_in_place
 

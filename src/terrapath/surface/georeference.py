@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import MapError
-from ..validation import Array, Bounds
+from ..validation import Array
+from .bounds import Bounds
 
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..validation import Array, Bounds, require_not_negative
+from ..validation import Array, require_not_negative
 from .blocks import blocks
+from .bounds import Bounds
 
 FEATURES_PER_SCALE = 2.0  # a resolution of half a standard deviation, as for Gaussian peaks
 SLOPE_ERROR = 0.01  # rms slope that rounded heights may leave: 1 %, half a degree

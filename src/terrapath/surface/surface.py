@@ -12,16 +12,9 @@ import numpy as np
 
 from .._kernels.surface.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
 from ..errors import InputError, OutsideSurfaceError
-from ..validation import (
-    Array,
-    Bounds,
-    as_array,
-    as_bounds,
-    as_points,
-    require_not_negative,
-    require_positive,
-)
+from ..validation import Array, as_array, as_points, require_not_negative, require_positive
 from .blocks import blocks
+from .bounds import Bounds, as_bounds
 from .costs import limited, require_cost_range, require_costs, with_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference

@@ -20,7 +20,8 @@ from ..._kernels.geodesics import contacts as kernels
 from ..._kernels.space import free_space as grids
 from ...space.free_space import FreeSpace, Indices, index_grid, listed
 from ...surface import Mask
-from ...validation import Array, Bounds
+from ...surface.bounds import Bounds
+from ...validation import Array
 
 # Walls stand behind the places where a path touches them by this share of the clearance.
 SLACK = 0.01

@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ...errors import MapError
-from ...validation import Bounds
+from ...surface.bounds import Bounds
 from .layers import VectorWarning, read_layers, tell
 from .plane import Plane, Where, placed
 

@@ -16,8 +16,9 @@ from shapely.geometry.base import BaseGeometry
 from ...errors import InputError, MapError
 from ...space.free_space import POINTS, Geometries, outlines, simple_parts
 from ...surface import Surface
+from ...surface.bounds import Bounds
 from ...surface.georeference import Georeference
-from ...validation import Array, Bounds
+from ...validation import Array
 from .layers import (
     Layer,
     VectorWarning,

@@ -1,0 +1,75 @@
+"""Bounds: the rectangle of the plane that a surface covers, or that is planned in."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..validation import Array
+
+
+class Bounds(NamedTuple):
+    """A rectangle of the plane, in map units; its edge belongs to it."""
+
+    x1_min: float
+    x2_min: float
+    x1_max: float
+    x2_max: float
+
+    @property
+    def width(self) -> float:
+        """Extent along x1, map units."""
+        return self.x1_max - self.x1_min
+
+    @property
+    def height(self) -> float:
+        """Extent along x2, map units."""
+        return self.x2_max - self.x2_min
+
+    @property
+    def side(self) -> float:
+        """Side of the square that is as large, map units."""
+        return math.sqrt(self.width * self.height)
+
+    def widened(self, margin: float) -> Bounds:
+        """With so much more on every side, map units."""
+        low, high = (self.x1_min - margin, self.x2_min - margin), (self.x1_max, self.x2_max)
+        return Bounds(*low, *(edge + margin for edge in high))
+
+    def contains(self, points: Array) -> npt.NDArray[np.bool_]:
+        """Points (..., 2) -> (...) bool."""
+        x, y = points[..., 0], points[..., 1]
+        inside = (x >= self.x1_min) & (x <= self.x1_max) & (y >= self.x2_min) & (y <= self.x2_max)
+        return np.asarray(inside)
+
+    def encloses(self, other: Bounds) -> bool:
+        """Does the other rectangle lie wholly in this one?"""
+        return bool(self.contains(np.array([other[:2], other[2:]])).all())
+
+    def __str__(self) -> str:
+        return (
+            f"x1 in [{self.x1_min:.10g}, {self.x1_max:.10g}], "
+            f"x2 in [{self.x2_min:.10g}, {self.x2_max:.10g}]"
+        )
+
+
+def as_bounds(bounds: Any, name: str = "bounds") -> Bounds:
+    """(x1_min, x2_min, x1_max, x2_max), finite and not empty."""
+    try:
+        result = Bounds(*(float(value) for value in bounds))
+    except (TypeError, ValueError):
+        raise InputError(
+            f"{name}={bounds!r} is not a rectangle; give (x1_min, x2_min, x1_max, x2_max)"
+        ) from None
+    if not all(map(math.isfinite, result)):
+        raise InputError(f"{name}={tuple(result)} is not finite; give four finite numbers")
+    if not (result.width > 0.0 and result.height > 0.0):
+        raise InputError(
+            f"{name}={tuple(result)} is empty; "
+            "the order is (x1_min, x2_min, x1_max, x2_max) with each minimum below its maximum"
+        )
+    return result
