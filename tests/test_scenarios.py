@@ -16,14 +16,14 @@ from rasterio.transform import from_origin
 from typer.main import get_command
 
 import terrapath as tp
-from terrapath.cli.main import app, run
+from terrapath.cli.main import application, run
 from terrapath.errors import InputError
 from terrapath.io.vectors.layers import read_layers
 from terrapath.planners import tours
-from terrapath.scenario.listing import options
-from terrapath.scenario.problem_options import LayerTable
-from terrapath.scenario.scenario import Scenario
-from terrapath.scenario.toml import read_scenario, scenario_schema
+from terrapath.scenario import Scenario, scenario_schema
+from terrapath.scenario.scenario import options
+from terrapath.scenario.sections import LayerTable
+from terrapath.scenario.toml import read_scenario
 
 ROOT = Path(__file__).parents[1]
 QUICK = ["--samples", "400", "--no-bound"]
@@ -82,7 +82,7 @@ def scenario(text, path="scenario.toml"):
 def flags_of(command):
     return {
         flag
-        for parameter in get_command(app).commands[command].params
+        for parameter in get_command(application()).commands[command].params
         for flag in (*parameter.opts, *parameter.secondary_opts)
         if flag.startswith("-")
     }
@@ -130,7 +130,7 @@ def test_help_reads_no_scenario():
     program = (
         "import sys\nfrom terrapath.cli.main import run\n"
         "for command in ('plan', 'init', 'schema'):\n    assert run([command, '--help']) == 0\n"
-        "assert not {'terrapath.io.scenario', 'numpy', 'tomllib'} & set(sys.modules)\n"
+        "assert not {'terrapath.scenario.toml', 'numpy', 'tomllib'} & set(sys.modules)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -11,7 +11,7 @@ import pytest
 
 from processes import in_another_process
 from terrapath._kernels import compiler, signatures
-from terrapath.cli import compiling
+from terrapath.cli import console
 from terrapath.cli.main import run
 from terrapath.errors import InputError
 from terrapath.planners import warmup
@@ -38,7 +38,7 @@ class Terminal:
 
 def compile_two():
     for name in ("grow", "march"):
-        logging.getLogger(compiling.LOGGER).info("compiling %s", name)
+        logging.getLogger(console.LOGGER).info("compiling %s", name)
 
 
 @pytest.mark.parametrize(
@@ -55,12 +55,12 @@ def test_compiling_is_told_once_where_it_happens_and_somebody_watches(
 ):
     terminal = Terminal(watched)
     monkeypatch.setattr(sys, "stderr", terminal)
-    with compiling.compiling_told(quiet):
+    with console.compiling_told(quiet):
         work()
     compile_two()  # which is nobody's business any more
     assert terminal.text.count("compiling kernels, once") == lines
     assert len(terminal.text.splitlines()) == lines
-    assert not logging.getLogger(compiling.LOGGER).handlers
+    assert not logging.getLogger(console.LOGGER).handlers
 
 
 CALLEE = "from .compiler import kernel\n\n@kernel\ndef callee(x, n):\n    return x * (n + 1)\n"
@@ -92,7 +92,7 @@ def call(tmp_path):
         shutil.copy(module.__file__, package)
     (package / "callee.py").write_text(CALLEE)
     (package / "caller.py").write_text(CALLER)
-    code = CALL.format(str(tmp_path), compiling.LOGGER)
+    code = CALL.format(str(tmp_path), console.LOGGER)
     return lambda: in_another_process(code, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
 
 

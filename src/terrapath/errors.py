@@ -1,6 +1,9 @@
 """What goes wrong with an input. Every message names the value, the limit and the remedy."""
 
 import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 
 class TerrapathError(Exception):
@@ -42,4 +45,40 @@ class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
 def warn_unfinished(what: str, error: Exception) -> None:
     """Tell what could not be done, and why."""
     reason = " ".join(f"{type(error).__name__}: {error}".split())
-    warnings.warn(f"{what}: {reason}", UnfinishedWarning, stacklevel=3)
+    tell(UnfinishedWarning(f"{what}: {reason}"))
+
+
+_LISTENER: ContextVar[Callable[[TerrapathWarning], None] | None] = ContextVar(
+    "listener", default=None
+)
+
+
+def tell(warning: TerrapathWarning) -> None:
+    listener = _LISTENER.get()
+    if listener is None:
+        warnings.warn(warning, stacklevel=3)
+    else:
+        listener(warning)
+
+
+@contextmanager
+def told_to(listener: Callable[[TerrapathWarning], None]) -> Iterator[None]:
+    before = _LISTENER.set(listener)
+    try:
+        yield
+    finally:
+        _LISTENER.reset(before)
+
+
+@contextmanager
+def collecting() -> Iterator[list[TerrapathWarning]]:
+    told: list[TerrapathWarning] = []
+    outer = _LISTENER.get()
+
+    def note(warning: TerrapathWarning) -> None:
+        told.append(warning)
+        if outer is not None:
+            outer(warning)
+
+    with told_to(note):
+        yield told

@@ -8,13 +8,30 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import MapError
+from ..errors import InputError, MapError
 
 # The one output that is a folder: a ROS 2 bag, and the file that tells that a folder is one.
 BAG_ENDING, BAG_MARK = ".bag2", "metadata.yaml"
 
 # Short, for a name of the output's own length may leave no room for more.
 TEMPORARY = ".terrapath-"
+
+
+def is_there(path: Path) -> bool:
+    """Is there a file or a folder? No name that none can have is there."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def require_name(path: Path) -> None:
+    """Raise InputError for a name that no file can have."""
+    try:
+        path.exists()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{str(path)[:60]!r} cannot be a file: {reason}; check the path") from None
 
 
 def _require_bag(path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .exit_codes import ExitCode
+from .console import ExitCode
 
 
 def init_command(
@@ -34,8 +34,8 @@ def init_command(
     """
     from .._support.files import written_whole
     from ..problem.scenes import SCENES
+    from ..scenario.outputs import require_ending, require_outputs
     from ..scenario.template import scenario_of_map, scenario_of_scene
-    from .outputs import require_ending, require_outputs
 
     file = output or Path(f"{where if where in SCENES else Path(where).stem}.toml")
     require_ending(file, "output", ".toml")

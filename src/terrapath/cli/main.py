@@ -4,44 +4,22 @@ from __future__ import annotations
 
 import gc
 import sys
+from collections.abc import Iterable
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 
 from .. import __version__
 from ..errors import TerrapathError
-from .check import check_command
-from .exit_codes import ExitCode
-from .field import field_command
-from .init import init_command
-from .plan import plan_command
-from .remarks import remark, remarks
-from .reproduce import reproduce_command
-from .scenes import scenes_command
-from .schema import schema_command
-from .streams import settle
-from .warmup import warmup_command
+from .console import ExitCode, remark, remarks, settle
 
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
 # its usage errors is reached through the one it exports.
 UsageError: Any = typer.BadParameter.__mro__[1]
 
-
-app = typer.Typer(
-    help="Optimal paths on terrain, with proof.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command("plan")(plan_command)
-app.command("check")(check_command)
-app.command("field")(field_command)
-app.command("init")(init_command)
-app.command("schema")(schema_command)
-app.command("scenes")(scenes_command)
-app.command("reproduce")(reproduce_command)
-app.command("warmup")(warmup_command)
+# Each stands in a module of its name, as ``plan_command`` in ``plan``.
+COMMANDS = ("plan", "check", "field", "init", "schema", "scenes", "reproduce", "warmup")
 
 
 def _show_version(wanted: bool) -> None:
@@ -50,13 +28,33 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show it.")
     ] = False,
 ) -> None:
     pass
+
+
+def application(names: Iterable[str] = COMMANDS) -> typer.Typer:
+    """The command with some of its sub-commands; only their modules are imported."""
+    app = typer.Typer(
+        help="Optimal paths on terrain, with proof.",
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_root)
+    for name in names:
+        module = import_module(f".{name}", __package__)
+        app.command(name)(getattr(module, f"{name}_command"))
+    return app
+
+
+def _asked(arguments: list[str]) -> Iterable[str]:
+    """The sub-commands that must be known to answer: the one that is called, or all."""
+    return arguments[:1] if arguments[:1] and arguments[0] in COMMANDS else COMMANDS
 
 
 def _fail(message: str) -> int:
@@ -74,12 +72,13 @@ def _not_shown(reason: object) -> int:
     return ExitCode.NOT_SHOWN
 
 
-def run(arguments: list[str] | None = None, command: typer.Typer = app) -> int:
+def run(arguments: list[str] | None = None, command: typer.Typer | None = None) -> int:
     """Run the command and return its exit code; no error escapes as a traceback."""
     given = sys.argv[1:] or ["--help"] if arguments is None else arguments
     try:
         with remarks():
-            return command(given, standalone_mode=False) or ExitCode.SOLVED
+            app = command or application(_asked(given))
+            return app(given, standalone_mode=False) or ExitCode.SOLVED
     except UsageError as error:
         return _fail(error.format_message())
     except TerrapathError as error:

@@ -9,9 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..scenario.listing import Declared, options
-from ..scenario.option import Extent, Files
-from ..scenario.problem_options import LayerTable, LayerTables, Point, Points, Rectangle, Weights
+from ..scenario.option import Declared, Extent, Files, Point, Points, Rectangle
+from ..scenario.scenario import options
+from ..scenario.sections import LayerTable, LayerTables, Weights
 
 Where = Annotated[
     str,

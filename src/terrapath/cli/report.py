@@ -11,9 +11,9 @@ from ..certificates.certificate import Certificate
 from ..distance.field import DistanceField
 from ..planners import GoalAnswer
 from ..problem import Path, Problem, Solution, Status
+from ..scenario.answers import goal_status
 from ..surface import Layer, Surface
-from .records import goal_state
-from .remarks import remark
+from .console import percent, remark
 
 # Of the routes that a planner found besides the best, so many are shown.
 MOST_ALTERNATIVES = 5
@@ -23,11 +23,6 @@ def _amount(value: float, unit: str) -> str:
     """A number with its unit; millimetres on maps, micro-units on small scenes."""
     digits = ",.3f" if abs(value) >= 1000.0 else ".6f"
     return f"{value:{digits}} {unit}".rstrip()
-
-
-def percent(share: float) -> str:
-    """A share in percent, to three digits."""
-    return f"{100.0 * share:.3g} %"
 
 
 def _gap(gap: float, target: float | None) -> str:
@@ -236,7 +231,7 @@ def _print_goals(goals: Iterable[GoalAnswer], surface: Surface) -> None:
         (
             str(k),
             _place(answer.goal),
-            goal_state(answer),
+            goal_status(answer),
             _optional(None if answer.solution is None else answer.solution.length, surface.unit),
             _optional(answer.least, surface.unit),
         )
@@ -281,9 +276,11 @@ def print_check(problem: Problem, certificate: Certificate, seconds: float) -> N
     )
 
 
-def print_field(problem: Problem, field: DistanceField, seconds: float) -> None:
+def print_field(field: DistanceField, seconds: float) -> None:
     """What a distance field covers."""
-    unit, lattice = problem.surface.unit, field.lattice
+    problem, lattice = field.problem, field.lattice
+    assert problem is not None  # as of all that commands make
+    unit = problem.surface.unit
     reached = field.values[np.isfinite(field.values)]
     _print_table(
         [

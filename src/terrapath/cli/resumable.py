@@ -8,9 +8,7 @@ from pathlib import Path
 import typer
 
 from .._support.watching import Watch
-from .bars import bar_for_each
-from .exit_codes import ExitCode
-from .remarks import remark
+from .console import ExitCode, bar_for_each, remark
 
 
 def run_resumable(work: Callable[[Watch], Path], output: Path, quiet: bool) -> int:

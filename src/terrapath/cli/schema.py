@@ -9,6 +9,6 @@ import typer
 
 def schema_command() -> None:
     """Print the JSON Schema of scenario files, for editors that check and complete them."""
-    from ..scenario.toml import scenario_schema
+    from ..scenario.checked import scenario_schema
 
     typer.echo(json.dumps(scenario_schema(), indent=2))

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .bars import bar_for_all
-from .exit_codes import ExitCode
+from .console import ExitCode, bar_for_all
 
 
 def warmup_command(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -352,3 +352,24 @@ def _read_all(parts: list[_Part], base: View, target: Grid, most_cells: int) -> 
         else:
             _onto(view, target, out)
     return bands
+
+
+class OpenMap:
+    """Shim until maps are opened once."""
+
+    def __init__(self, source: Any, **options: Any) -> None:
+        self.source, self.options = source, options
+
+    def cells(self, within: Any = None) -> int:
+        o = self.options
+        return count_cells(self.source, height_band=o["height_band"], crs=o["crs"], within=within)
+
+    def surface(self, *, within: Any = None, margin: float = 0.0, decimate: int = 1) -> Surface:
+        return read_surface(
+            self.source, within=within, margin=margin, decimate=decimate, **self.options
+        )
+
+
+@contextmanager
+def open_map(source: Any, **options: Any) -> Iterator[OpenMap]:
+    yield OpenMap(source, **options)

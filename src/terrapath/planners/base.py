@@ -34,6 +34,7 @@ class Progress(NamedTuple):
     lower_bound: float = 0.0  # map units, 0 before one is proven
     stage: str = SEARCHING
     leg: str = ""  # of a tour, in words
+    unit: str = ""  # of costs and bounds, where there is one
 
     @property
     def gap(self) -> float:

@@ -1,13 +1,25 @@
-"""What is said of one option, and how pydantic reads it."""
+"""One option: its name, type and default, and what is said of it."""
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias, get_type_hints
 
 # How pydantic reads a section: unknown keys are errors, and so are NaN and infinity.
 STRICT: dict[str, Any] = {"extra": "forbid", "allow_inf_nan": False}
+
+Point: TypeAlias = tuple[float, float]
+Points: TypeAlias = tuple[Point, ...]
+Rectangle: TypeAlias = tuple[float, float, float, float]
+Files: TypeAlias = tuple[str, ...]
+Extent: TypeAlias = float | Literal["auto", "none"]
+
+# What a value has to be, in words.
+NUMBER, WHOLE, SWITCH, TEXT = "a finite number", "a whole number", "true or false", "text"
+FILE, FILES = "the path of a file, as text", "a list of paths, each as text"
+A_POINT = "two finite numbers, [X, Y]"
 
 
 @dataclass(frozen=True)
@@ -47,12 +59,74 @@ def _forbid_conversion(schema: Any) -> None:
             _forbid_conversion(part)
 
 
-# Types of more than one section.
-Files: TypeAlias = tuple[str, ...]
-Extent: TypeAlias = float | Literal["auto", "none"]
+# Options of one kind
 
-# What a value has to be, in words.
-NUMBER, WHOLE, SWITCH, TEXT = "a finite number", "a whole number", "true or false", "text"
-FILE, FILES = "the path of a file, as text", "a list of paths, each as text"
-A_POINT = "two finite numbers, [X, Y]"
-COUNT: Any = functools.partial(Option, expects=WHOLE, form="N")
+
+def a_number(text: str, form: str, example: str = "") -> Option:
+    """An option that takes a number."""
+    return Option(text, NUMBER, form, example=example)
+
+
+def a_count(text: str, example: str) -> Option:
+    """An option that takes a whole number of things."""
+    return Option(text, WHOLE, "N", example=example)
+
+
+def a_switch(text: str, *flags: str, example: str = "") -> Option:
+    """An option that is on or off."""
+    return Option(text, SWITCH, flags=flags, example=example)
+
+
+def a_file(text: str, example: str, form: str = "FILE") -> Option:
+    """An option that takes a file."""
+    return Option(text, FILE, form, example=example, is_file=True)
+
+
+def some_files(text: str, example: str, *flags: str) -> Option:
+    """An option that takes any number of files."""
+    return Option(text, FILES, "FILE", flags, example, is_file=True)
+
+
+# Options as the sections declare them
+
+
+class Declared(NamedTuple):
+    """An option with its place, as it was declared."""
+
+    section: str
+    key: str
+    type: Any
+    default: Any
+    option: Option
+
+    @property
+    def parameter(self) -> str:
+        """Its name among the arguments of a command."""
+        return f"{self.section}_{self.key}"
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Its names on the command line; none where the command names it in another place."""
+        if self.key in {"path", "scene"}:
+            return ()
+        return self.option.flags or (f"--{self.key.replace('_', '-')}",)
+
+    @property
+    def keyword(self) -> str:
+        """Its name as a keyword in Python."""
+        return {"name": "planner", "files": "output"}.get(self.key, self.key)
+
+
+@functools.cache
+def declared(section: type) -> tuple[tuple[str, Any, Any, Option], ...]:
+    """Key, type, default and option of each field of a section, in order."""
+    hints = get_type_hints(section, include_extras=True)
+    return tuple(
+        (
+            entry.name,
+            hints[entry.name].__origin__,
+            entry.default if entry.default is not dataclasses.MISSING else {},
+            hints[entry.name].__metadata__[0],
+        )
+        for entry in dataclasses.fields(section)
+    )

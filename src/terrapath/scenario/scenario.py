@@ -7,10 +7,24 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from .listing import SECTIONS, options
-from .option import STRICT
-from .problem_options import ConstraintsSection, MapSection, RouteSection
-from .solution_options import OutputSection, PlannerSection
+from .option import STRICT, Declared, declared
+from .sections import ConstraintsSection, MapSection, OutputSection, PlannerSection, RouteSection
+
+# Of a scenario file, in its order.
+SECTIONS: Mapping[str, type] = {
+    "map": MapSection,
+    "route": RouteSection,
+    "constraints": ConstraintsSection,
+    "planner": PlannerSection,
+    "output": OutputSection,
+}
+
+
+def options(*sections: str) -> Iterator[Declared]:
+    """The options of the sections, of all by default."""
+    for name in sections or SECTIONS:
+        for key, kind, default, option in declared(SECTIONS[name]):
+            yield Declared(name, key, kind, default, option)
 
 
 @dataclass(frozen=True, kw_only=True)

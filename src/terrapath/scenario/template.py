@@ -18,8 +18,9 @@ from ..errors import InputError, MapError, OutsideSurfaceError
 from ..problem import Problem
 from ..problem.scenes import load, names
 from ..surface import Surface
-from .listing import SECTIONS, Declared, declared, options
-from .problem_options import LayerTable
+from .option import Declared, declared
+from .scenario import SECTIONS, options
+from .sections import LayerTable
 
 # Words that name heights in the description of a band.
 HEIGHT_WORDS = ("height", "elevation", "altitude", "dem", "dtm", "dsm", "topograph")

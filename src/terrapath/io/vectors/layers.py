@@ -30,9 +30,11 @@ class RepairedWarning(VectorWarning):
     """Geometries of a vector file were not valid, and have been repaired."""
 
 
-def tell(category: type[Warning], text: str) -> None:
+def tell(category: type[TerrapathWarning], text: str) -> None:
     """Warn, at the caller."""
-    warnings.warn(text, category, stacklevel=2)
+    from ...errors import tell as say
+
+    say(category(text))
 
 
 @dataclass(frozen=True, eq=False)

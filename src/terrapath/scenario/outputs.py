@@ -1,4 +1,4 @@
-"""Files that a command will write: found out beforehand whether it can."""
+"""Files that will be written: whether they can be is found out before anything is planned."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import MapError
-from ..scenario.solution_options import OutputSection
-from .remarks import remark
+from ..errors import InputError, MapError, UnfinishedWarning, tell
+from .sections import OutputSection
 
 if TYPE_CHECKING:
+    from ..distance.field import DistanceField
     from ..problem import Problem, Solution
 
 
@@ -126,7 +126,7 @@ class RouteOutputs:
             write_route(solution, path)
         for path, leg in zip(self.certificates, solution.legs or [solution], strict=False):
             if leg.certificate is None:
-                remark(f"no bound was proven to write a certificate of into {path}")
+                tell(UnfinishedWarning(f"{path} was not written: no bound was proven"))
             else:
                 leg.certificate.save(path)
         if asked.plot is not None:
@@ -141,3 +141,36 @@ class RouteOutputs:
             from ..plotting import plot_page
 
             plot_page(solution, asked.page)
+
+
+@dataclass(frozen=True)
+class FieldOutputs:
+    """Where the field goes."""
+
+    files: Sequence[Path]
+    plot: Path | None
+
+    def check(self, inputs: Iterable[str]) -> None:
+        """Find out beforehand whether all can be written, and replaces no input."""
+        from ..io.fields import require_known_format
+
+        if not self.files and self.plot is None:
+            raise InputError("no output is named; give --output FILE.tif, or --plot FILE.png")
+        for path in self.files:
+            require_known_format(path)
+        if self.plot is not None:
+            from ..plotting.figure import require_known_picture
+
+            require_known_picture(self.plot)
+        require_outputs([*self.files, *([] if self.plot is None else [self.plot])], inputs)
+
+    def write(self, field: DistanceField) -> None:
+        """Write every file."""
+        from ..io import write_field
+
+        for path in self.files:
+            write_field(field, path)
+        if self.plot is not None:
+            from ..plotting import plot_field
+
+            plot_field(field, self.plot)

@@ -1,0 +1,194 @@
+"""What a person sees on the terminal beside the answer: lines, progress bars, exit codes."""
+
+from __future__ import annotations
+
+import enum
+import math
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, TextIO
+
+from .._support.watching import Watch, watch_nothing
+from ..errors import TerrapathWarning, told_to
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
+    from rich.progress import TaskID
+
+    from ..planners.base import Callback, Progress
+
+
+class ExitCode(enum.IntEnum):
+    """The documented codes."""
+
+    SOLVED = 0
+    BAD_INPUT = 2
+    NOT_FOUND = 3
+    UNREACHABLE = 4
+    NOT_SHOWN = 5  # standard output is closed or full; files are written
+    INTERRUPTED = 130
+
+
+# Lines
+
+
+def remark(message: object) -> None:
+    """One line on standard error, if anybody takes it."""
+    with suppress(OSError):
+        print("terrapath:", " ".join(str(message).split()), file=sys.stderr)
+
+
+@contextmanager
+def remarks() -> Iterator[None]:
+    """Show the project's warnings as remarks, each once."""
+    shown = set[str]()
+
+    def show(warning: TerrapathWarning) -> None:
+        if str(warning) not in shown:
+            shown.add(str(warning))
+            remark(warning)
+
+    with told_to(show):
+        yield
+
+
+def settle(*streams: TextIO | None) -> None:
+    """Flush for the last time; what a stream does not take goes nowhere.
+
+    Python flushes once more at its end: what fails then is a complaint, and another exit code.
+    """
+    for stream in streams:
+        if stream is None:  # closed from the beginning
+            continue
+        try:
+            stream.flush()
+        except OSError:
+            with suppress(OSError):  # one that is no file
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+# Bars
+
+
+def is_watched(quiet: bool) -> bool:
+    """Does somebody see what is drawn?"""
+    return not quiet and sys.stderr.isatty()
+
+
+def make_bars(prefix: str = "", *, transient: bool = True) -> Bars:
+    """Bars with what is done of how much, and the time. transient : they vanish at the end."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn(f"[bold]{prefix}{{task.description}}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    return Progress(*columns, console=Console(stderr=True), transient=transient)
+
+
+@contextmanager
+def bar_for_all(what: str, quiet: bool) -> Iterator[Watch]:
+    """A watcher that draws one bar, which names what is done and the stage it is at."""
+    if not is_watched(quiet):
+        yield watch_nothing
+        return
+    with make_bars(f"{what}: ") as bar:
+        task = bar.add_task("", total=None)
+
+        def show(stage: str, done: int, total: int) -> None:
+            bar.update(task, description=stage, completed=done, total=total)
+
+        yield show
+
+
+@contextmanager
+def bar_for_each(quiet: bool) -> Iterator[Watch]:
+    """A watcher that draws one bar a stage; they stay."""
+    if not is_watched(quiet):
+        yield watch_nothing
+        return
+    with make_bars(transient=False) as bars:
+        tasks: dict[str, TaskID] = {}
+
+        def show(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done)
+
+        yield show
+
+
+@contextmanager
+def progress_bar(quiet: bool) -> Iterator[Callback | None]:
+    """A callback that draws a planner's progress; None where nobody is watching."""
+    if not is_watched(quiet):
+        yield None
+        return
+    from ..planners.base import SEARCHING
+
+    with make_bars() as bar:
+        # Until the first report the kernels are loaded, or compiled where they are new.
+        task = bar.add_task("preparing kernels", total=None)
+
+        def show(progress: Progress) -> None:
+            total = progress.total if progress.stage == SEARCHING else None
+            bar.update(
+                task, description=_describe(progress), total=total, completed=progress.samples
+            )
+
+        yield show
+
+
+def _describe(progress: Progress) -> str:
+    """Which leg it is, what is being done, and how good the best path is."""
+    from ..planners.base import SEARCHING
+
+    leg = f"{progress.leg}: " if progress.leg else ""
+    if math.isfinite(progress.gap):
+        return f"{leg}{progress.stage}, gap {percent(progress.gap)}"
+    if progress.stage != SEARCHING:
+        return leg + progress.stage
+    if math.isfinite(progress.best_cost):
+        return f"{leg}best {progress.best_cost:,.6g} {progress.unit}".rstrip()
+    return f"{leg}no path yet"
+
+
+def percent(share: float) -> str:
+    """A share in percent, to three digits."""
+    return f"{100.0 * share:.3g} %"
+
+
+# Compiling
+
+
+# Where `_kernels/compiler.py` logs each kernel that the cache lacks.
+LOGGER = "terrapath.kernels"
+
+
+@contextmanager
+def compiling_told(quiet: bool = False) -> Iterator[None]:
+    """Say once on standard error that kernels are compiled, if any are and somebody watches."""
+    if not is_watched(quiet):
+        yield
+        return
+    import logging
+
+    class Teller(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            logger.removeHandler(self)
+            remark("compiling kernels, once; `terrapath warmup` does it for all commands")
+
+    logger, teller = logging.getLogger(LOGGER), Teller()
+    before = logger.level
+    logger.setLevel(logging.INFO)
+    logger.addHandler(teller)
+    try:
+        yield
+    finally:
+        logger.removeHandler(teller)
+        logger.setLevel(before)

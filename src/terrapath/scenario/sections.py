@@ -1,0 +1,363 @@
+"""The options of ``terrapath plan`` and of scenario files, each declared once.
+
+The command line, scenario files, their JSON Schema, ``tp.scenario.load`` and what ``terrapath
+init`` writes are made of these declarations. Nothing heavy is imported here: typer reads them to
+print the help, and pydantic comes only with values to check.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar, TypeAlias
+
+from .option import (
+    A_POINT,
+    NUMBER,
+    STRICT,
+    TEXT,
+    WHOLE,
+    Extent,
+    Files,
+    Option,
+    Point,
+    Points,
+    Rectangle,
+    a_count,
+    a_file,
+    a_number,
+    a_switch,
+    some_files,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayerTable:
+    """A band of a raster as a layer."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    file: Annotated[str, a_file("The raster.", '"layer.tif"')]
+    band: Annotated[int, Option("Its band, 1-based.", WHOLE)] = 1
+    weight: Annotated[
+        float,
+        Option(
+            "Of a layer: the map units that a change of one unit of it counts as. Of a cost: the "
+            "exponent of the multiplier.",
+            NUMBER,
+        ),
+    ] = 1.0
+
+
+LayerTables: TypeAlias = dict[str, LayerTable]
+Weights: TypeAlias = dict[str, float]
+A_LAYER = "a table with file, band and weight"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapSection:
+    """The ground: a raster with its layers, or a built-in scene."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    path: Annotated[str | None, a_file("A raster, anything GDAL reads.", '"dem.tif"')] = None
+    scene: Annotated[
+        str | None, Option("A built-in scene, see `terrapath scenes`.", TEXT, example='"six-peaks"')
+    ] = None
+    height_band: Annotated[
+        int | str | None,
+        Option(
+            "Band of the heights, its number or the name of a variable [default: 1].",
+            "a whole number, or the name of a variable as text",
+            form="BAND",
+            example="1",
+        ),
+    ] = None
+    fill_holes: Annotated[
+        float,
+        a_number(
+            "Fill holes without data whose longer side is at most this, map units; larger ones "
+            "stay blocked [default: 0, none].",
+            "SIZE",
+        ),
+    ] = 0.0
+    smooth: Annotated[
+        Extent,
+        Option(
+            "Smooth over this length (standard deviation, map units); auto is the least that "
+            "heights rounded to a step need [default], none leaves the map as it is.",
+            'a finite number, "auto" or "none"',
+            form="LENGTH|auto|none",
+        ),
+    ] = "auto"
+    crs: Annotated[
+        str | None,
+        Option("CRS of a map that names none, as EPSG:32617.", TEXT, "CRS", (), '"EPSG:32617"'),
+    ] = None
+    layers: Annotated[
+        LayerTables,
+        Option(
+            "A further layer, whose change costs; may be repeated.",
+            A_LAYER,
+            form="NAME=FILE[:BAND][*WEIGHT]",
+            flags=("--layer",),
+        ),
+    ] = field(default_factory=dict)
+    costs: Annotated[
+        LayerTables,
+        Option(
+            "A multiplier above 0 of the length, whose level costs; may be repeated.",
+            A_LAYER,
+            form="NAME=FILE[:BAND][*EXPONENT]",
+            flags=("--cost",),
+        ),
+    ] = field(default_factory=dict)
+    weights: Annotated[
+        Weights,
+        Option(
+            "Map units that a change of one unit of a layer counts as, the height's too; may be "
+            "repeated.",
+            "a table of numbers, NAME = WEIGHT",
+            form="NAME=WEIGHT",
+            flags=("--weight",),
+        ),
+    ] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteSection:
+    """From where to where."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    start: Annotated[
+        Point | None,
+        Option("Start, in the map's own coordinates.", A_POINT, "X,Y", example="[0.0, 0.0]"),
+    ] = None
+    goal: Annotated[
+        Point | Points,
+        Option(
+            "Goal, in the map's own coordinates; of several the nearest by true length wins.",
+            "a point, [X, Y], or a list of points",
+            form="X,Y",
+            example="[10.0, 10.0]",
+        ),
+    ] = ()
+    all_goals: Annotated[
+        bool,
+        a_switch(
+            "Plan to each of several goals and report all, or only as far as is needed to know "
+            "the nearest [default].",
+            "--all-goals/--nearest-goal",
+        ),
+    ] = False
+    via: Annotated[
+        Points,
+        Option(
+            "Pass through this point; may be repeated, in order.",
+            "a list of points, [[X, Y], ...]",
+            form="X,Y",
+            example="[[5.0, 2.0]]",
+        ),
+    ] = ()
+    latlon: Annotated[
+        bool,
+        a_switch(
+            "Start, goal and via are latitude,longitude in degrees: WGS 84 on Earth, the body's "
+            "own elsewhere.",
+            "--latlon/--no-latlon",
+        ),
+    ] = False
+    bounds: Annotated[
+        Rectangle | None,
+        Option(
+            "Plan within this rectangle, in the map's own coordinates [default: the whole map].",
+            "four finite numbers, [X1, Y1, X2, Y2]",
+            form="X1,Y1,X2,Y2",
+            example="[-1.0, -1.0, 11.0, 11.0]",
+        ),
+    ] = None
+
+    @property
+    def goals(self) -> Points:
+        """The goals, also where there is one."""
+        if self.goal and not isinstance(self.goal[0], tuple):
+            return (self.goal,)
+        return self.goal
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstraintsSection:
+    """Where the route may not go."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    obstacles: Annotated[
+        Files,
+        some_files(
+            "A vector file of obstacles, in any CRS; may be repeated.", '["obstacles.geojson"]'
+        ),
+    ] = ()
+    radius: Annotated[
+        float,
+        a_number(
+            "Of the vehicle: the least distance to every obstacle, map units [default: 0].", "R"
+        ),
+    ] = 0.0
+    max_slope: Annotated[
+        float | None,
+        a_number("The steepest ground that may be entered, degrees.", "DEGREES", "25.0"),
+    ] = None
+    keep_in: Annotated[
+        str | None,
+        a_file("A vector file of the area that may not be left, in any CRS.", '"area.geojson"'),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannerSection:
+    """How the route is looked for, and what is proven of it."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    name: Annotated[
+        str,
+        Option(
+            "rrt-star-r, rrt-star (chord baseline), rrt, dijkstra, a-star, fast-marching, "
+            "geodesic-traversal or optimal.",
+            "the name of a planner, as text",
+            form="NAME",
+            flags=("--planner",),
+        ),
+    ] = "rrt-star-r"
+    refine: Annotated[
+        bool,
+        a_switch(
+            "Take the planner's path to the locally shortest one [default], or not.",
+            "--refine/--no-refine",
+        ),
+    ] = True
+    bound: Annotated[
+        bool,
+        a_switch("Prove how short any path can be [default], or not.", "--bound/--no-bound"),
+    ] = True
+    target_gap: Annotated[
+        float | None,
+        a_number(
+            "Refine the bound until (length - bound) / bound is G "
+            "[default: 0.001 with optimal, else the first bound will do].",
+            "G",
+            "0.01",
+        ),
+    ] = None
+    routes: Annotated[
+        int | None, a_count("Distinct routes that optimal looks for [default: 3].", "3")
+    ] = None
+    samples: Annotated[int | None, a_count("Samples to draw [default: 10000].", "10000")] = None
+    step: Annotated[
+        float | None,
+        a_number("Longest edge, map units [default: a twelfth of the region's side].", "S", "1.0"),
+    ] = None
+    seed: Annotated[
+        int | None, Option("The same seed, the same route [default: 0].", WHOLE, "K", example="0")
+    ] = None
+    spacing: Annotated[
+        float | None,
+        a_number(
+            "Of the nodes of dijkstra, a-star, fast-marching, optimal and `terrapath field`, map "
+            "units [default: a 250th of the region's longer side, or a cell of a finer map].",
+            "D",
+            "0.05",
+        ),
+    ] = None
+    neighbours: Annotated[
+        int | None, a_count("Of a node of dijkstra and a-star: 8, 16 or 32 [default: 16].", "16")
+    ] = None
+    directions: Annotated[
+        int | None, a_count("Rays of geodesic-traversal [default: 600].", "600")
+    ] = None
+    radius_factor: Annotated[
+        float | None,
+        a_number("Times the least near radius of the theory [default: 1.5].", "F", "1.5"),
+    ] = None
+    goal_bias: Annotated[
+        float | None, a_number("Share of samples that are the goal [default: 0.05].", "P", "0.05")
+    ] = None
+    informed: Annotated[
+        bool | None,
+        a_switch(
+            "Sample where better paths can be [default], or everywhere.",
+            "--informed/--uniform",
+            example="true",
+        ),
+    ] = None
+    time_limit: Annotated[
+        float | None,
+        a_number("Stop then, with the best so far; legs and goals share it.", "SECONDS", "60.0"),
+    ] = None
+    corridor: Annotated[
+        Extent,
+        Option(
+            "Maps of over 16 million cells are planned on coarse to fine: then around the coarse "
+            "route alone, within this distance, map units; auto is 40 coarse cells [default], none "
+            "plans on all of the map at once.",
+            'a finite number, "auto" or "none"',
+            form="WIDTH|auto|none",
+        ),
+    ] = "auto"
+    target_length: Annotated[
+        float | None, a_number("Stop at a path this short, map units.", "LENGTH", "17.2")
+    ] = None
+
+    @property
+    def own(self) -> dict[str, Any]:
+        """The options of the planner itself that were given."""
+        general = {"name", "refine", "bound", "target_gap", "corridor"}
+        given = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+        return {k: v for k, v in given.items() if k not in general and v is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputSection:
+    """Where the answer goes."""
+
+    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+
+    files: Annotated[
+        Files,
+        some_files(
+            "Write the route, in the format of the ending; may be repeated.",
+            '["route.geojson"]',
+            "--output",
+        ),
+    ] = ()
+    plot: Annotated[
+        str | None,
+        a_file("Draw the route on the map: .png, .svg, .pdf or .jpg.", '"route.png"'),
+    ] = None
+    profile: Annotated[
+        str | None,
+        a_file(
+            "Draw heights and slopes along the route: .png, .svg, .pdf or .jpg.", '"profile.png"'
+        ),
+    ] = None
+    page: Annotated[
+        str | None,
+        a_file(
+            "Write an interactive 3-D page of terrain and route, .html.",
+            '"route.html"',
+            "FILE.html",
+        ),
+    ] = None
+    certificate: Annotated[
+        str | None,
+        a_file(
+            "Write the proof of the bound, .npz, for `terrapath check`; of several legs "
+            "numbered files.",
+            '"proof.npz"',
+        ),
+    ] = None
+    json: Annotated[
+        bool, a_switch("Print one JSON object and nothing else.", "--json/--no-json")
+    ] = False
+    quiet: Annotated[bool, a_switch("No progress bar.", "--quiet/--no-quiet", "-q")] = False
