@@ -36,7 +36,7 @@ def read(part):
 
 @pytest.fixture
 def small_limits(monkeypatch):
-    monkeypatch.setattr(corridor, "MOST_CELLS", 10_000)
+    monkeypatch.setattr(answers, "MOST_CELLS", 10_000)
     monkeypatch.setattr(corridor, "COARSE_CELLS", 3_600)
     monkeypatch.setattr(corridor, "HALF_WIDTH", 6.0)
 

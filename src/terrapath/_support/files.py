@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import InputError, MapError
+from ..errors import MapError
 
 # The one output that is a folder: a ROS 2 bag, and the file that tells that a folder is one.
 BAG_ENDING, BAG_MARK = ".bag2", "metadata.yaml"
@@ -23,15 +23,6 @@ def is_there(path: Path) -> bool:
         return path.exists()
     except (OSError, ValueError):
         return False
-
-
-def require_name(path: Path) -> None:
-    """Raise InputError for a name that no file can have."""
-    try:
-        path.exists()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{str(path)[:60]!r} cannot be a file: {reason}; check the path") from None
 
 
 def _require_bag(path: Path) -> None:

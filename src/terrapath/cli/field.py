@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ..scenario.loading import assembled
 from ..scenario.outputs import FieldOutputs
+from ..scenario.scenario import assembled
 from .console import ExitCode, compiling_told
 from .options import Where, with_options
 

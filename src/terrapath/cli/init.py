@@ -35,14 +35,14 @@ def init_command(
     from .._support.files import written_whole
     from ..problem.scenes import SCENES
     from ..scenario.outputs import require_ending, require_outputs
-    from ..scenario.template import scenario_of_map, scenario_of_scene
+    from ..scenario.templates import template
 
     file = output or Path(f"{where if where in SCENES else Path(where).stem}.toml")
     require_ending(file, "output", ".toml")
     require_outputs([file], [where])
     if file.exists() and not force:
         raise InputError(f"{file} exists; name another by --output, or give --force to replace it")
-    text = scenario_of_scene(where) if where in SCENES else scenario_of_map(where, file, crs)
+    text = template(where, file, crs=crs)
     with written_whole(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
     typer.echo(f"{file} is written; plan it by: terrapath plan {file}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..scenario.loading import assembled
+from ..scenario.scenario import assembled
 from .console import ExitCode, compiling_told, progress_bar
 from .options import Where, with_options
 

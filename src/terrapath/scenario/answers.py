@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError, TerrapathWarning, collecting
 from ..planners.base import Callback, Progress
 from .option import Point
-from .outputs import RouteOutputs
 from .question import Itinerary, Question, asked
 from .scenario import Scenario
 
@@ -21,6 +20,10 @@ if TYPE_CHECKING:
     from ..planners.finished import Finished
     from ..planners.tours import GoalAnswer
     from ..problem import Problem, Solution
+    from .outputs import RouteOutputs
+
+# A map with more cells than that is planned on in a corridor, coarse to fine.
+MOST_CELLS = 16_000_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,8 +53,9 @@ class Answer:
 
         Raises MapError, naming the file and the remedy.
         """
-        if self.solution.path is not None:
-            _outputs(self.scenario).write(self.solution)
+        outputs = _outputs(self.scenario)
+        if outputs is not None and self.solution.path is not None:
+            outputs.write(self.solution)
 
 
 def _goal_record(answer: GoalAnswer) -> dict[str, Any]:
@@ -83,7 +87,8 @@ def answer(scenario: Scenario, *, watch: Callback | None = None) -> Answer:
     _require_agreement(scenario)
     planner = _planner(scenario)
     outputs = _outputs(scenario)
-    outputs.check(scenario.inputs())
+    if outputs is not None:
+        outputs.check(scenario.inputs())
     with collecting() as warnings, asked(scenario) as question:
         run = _Run(planner, question, outputs, watch)
         cells = question.cells()
@@ -166,7 +171,12 @@ def _planner(scenario: Scenario) -> Finished:
     )
 
 
-def _outputs(scenario: Scenario) -> RouteOutputs:
+def _outputs(scenario: Scenario) -> RouteOutputs | None:
+    """The files to write; None where the scenario names none."""
+    if not any(scenario.outputs()):
+        return None
+    from .outputs import RouteOutputs
+
     return RouteOutputs(scenario.output, len(scenario.route.via) + 1)
 
 
@@ -175,11 +185,7 @@ def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
 
     cells : of the map that is asked about.
     """
-    if scenario.planner.corridor == "none" or not cells:
-        return False
-    from ..planners.corridor import MOST_CELLS
-
-    if cells <= MOST_CELLS:
+    if scenario.planner.corridor == "none" or cells <= MOST_CELLS:
         return False
     for what, is_asked in (
         ("several goals", len(scenario.route.goals) > 1),
@@ -202,7 +208,7 @@ class _Run:
 
     planner: Finished
     question: Question
-    outputs: RouteOutputs
+    outputs: RouteOutputs | None
     watch: Callback | None
 
     def whole(self) -> tuple[Solution, tuple[GoalAnswer, ...]]:
@@ -240,7 +246,8 @@ class _Run:
 
     def _itinerary(self, part: Part | None = None) -> Itinerary:
         itinerary = self.question.itinerary(part)
-        self.outputs.require_fit(itinerary.problem)
+        if self.outputs is not None:
+            self.outputs.require_fit(itinerary.problem)
         return itinerary
 
     def _told(self, problem: Problem) -> Callback | None:

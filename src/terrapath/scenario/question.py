@@ -52,7 +52,7 @@ def asked(scenario: Scenario) -> Iterator[Question]:
         return
     from ..io.maps import open_map
 
-    _require_map(place)
+    require_map(place.path or "")
     with open_map(
         place.path,
         height_band=1 if place.height_band is None else place.height_band,
@@ -74,15 +74,13 @@ def _sources(tables: dict[str, LayerTable]) -> dict[str, LayerSource]:
     }
 
 
-def _require_map(place: MapSection) -> None:
-    """Raise InputError where there can be no map of that name."""
-    from ..problem.scenes import names
+def require_map(name: str) -> None:
+    """Raise InputError for a name that is neither a scene's nor can be a map's."""
+    path = Path(name)
+    if not is_there(path) and not path.suffix and ":" not in name:
+        from ..problem.scenes import names
 
-    path = Path(place.path or "")
-    if not is_there(path) and not path.suffix and ":" not in str(path):
-        raise InputError(
-            f"{place.path!r} is neither a built-in scene ({', '.join(names())}) nor a file"
-        )
+        raise InputError(f"{name!r} is neither a built-in scene ({', '.join(names())}) nor a file")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import math
 import os
 import re
 import textwrap
@@ -15,10 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError, MapError, OutsideSurfaceError
+from ..planners.corridor import factor
 from ..problem import Problem
-from ..problem.scenes import load, names
+from ..problem.scenes import SCENES, load
 from ..surface import Surface
+from .answers import MOST_CELLS
 from .option import Declared, declared
+from .question import require_map
 from .scenario import SECTIONS, options
 from .sections import LayerTable
 
@@ -29,8 +31,6 @@ DERIVED_WORDS = ("slope", "aspect", "rough", "shade", "curvature", "error", "cou
 # Guessed ends lie on a grid of so many places a side, from corner to corner.
 PLACES = 9
 WIDTH = 88
-# On a larger map ends are guessed on means of its cells.
-MOST_CELLS = 16_000_000
 
 Values = Mapping[tuple[str, str], str]
 
@@ -47,33 +47,35 @@ class Band(NamedTuple):
         return f"{self.number} {self.description or 'without a description'}{unit}"
 
 
-def scenario_of_scene(name: str) -> str:
-    """The text of a scenario of a built-in scene."""
-    problem = load(name)
-    values = {
-        ("map", "scene"): _text(name),
-        **_ends(problem.surface, (problem.start, problem.goal)),
-    }
-    return _template(values, f"the built-in scene {name}", [])
+def template(where: str, file: str | Path = "scenario.toml", *, crs: str | None = None) -> str:
+    """The text of a scenario to begin with: every key with its help, and a route.
 
-
-def scenario_of_map(where: str, file: Path, crs: str | None = None) -> str:
-    """The text of a scenario of a raster, to be written into ``file``.
-
-    where : a file, or what GDAL reads under that name. crs : of a raster that names none. Start
-    and goal are guessed: free places far from one another that a way connects.
+    where : a built-in scene, a raster, or what GDAL reads under that name. file : where the text
+    will stand, for paths are seen from there. crs : of a raster that names none. Start and goal
+    on a raster are guessed: free places far from one another that a path connects.
     Raises MapError where the raster cannot be read, or has no two such places.
     """
-    from ..io.maps import count_cells, read_surface
+    if where in SCENES:
+        return _of_scene(where)
+    return _of_map(where, Path(file), crs)
 
-    path = Path(where)
-    if not path.exists() and not path.suffix and ":" not in where:
-        raise InputError(f"{where!r} is neither a built-in scene ({', '.join(names())}) nor a file")
+
+def _of_scene(name: str) -> str:
+    problem = load(name)
+    ends = _ends(problem.surface, (problem.start, problem.goal))
+    return _template({("map", "scene"): _text(name), **ends}, f"the built-in scene {name}", [])
+
+
+def _of_map(where: str, file: Path, crs: str | None) -> str:
+    from ..io.maps import open_map
+
+    require_map(where)
     bands = _bands(where)
     height = _height_band(bands)
-    cells = count_cells(where, height_band=height, crs=crs)
-    coarser = math.ceil(math.sqrt(cells / MOST_CELLS)) or 1
-    surface = read_surface(where, height_band=height, crs=crs, decimate=coarser)
+    with open_map(where, height_band=height, crs=crs) as opened:
+        # On a large map ends are guessed on means of its cells.
+        surface = opened.surface(decimate=factor(opened.cells(), MOST_CELLS))
+    path = Path(where)
     seen = Path(os.path.relpath(path, file.parent)).as_posix() if path.exists() else where
     values = {
         ("map", "path"): _text(seen),
@@ -113,7 +115,7 @@ def _height_band(bands: list[Band]) -> int:
 
 
 def _guess(surface: Surface) -> tuple[Any, Any]:
-    """Two free places far from one another that a way connects, plane."""
+    """Two free places far from one another that a path connects, plane."""
     bounds = surface.bounds
     assert bounds is not None
     along = np.linspace(0.1, 0.9, PLACES)
@@ -126,7 +128,7 @@ def _guess(surface: Surface) -> tuple[Any, Any]:
     for start, goal in sorted(pairs, key=lambda pair: -np.hypot(*np.subtract(*pair))):
         if not Problem(surface, start, goal).is_unreachable:
             return start, goal
-    raise MapError("no two free places of the map could be found that a way connects")
+    raise MapError("no two free places of the map could be found that a path connects")
 
 
 def _is_free(surface: Surface, place: Any) -> bool:
