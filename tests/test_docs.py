@@ -15,11 +15,14 @@ import pytest
 import rasterio
 from rasterio.transform import from_origin
 
+import terrapath as tp
 from terrapath.cli.main import run
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-LINKING = [*PAGES, *(ROOT / n for n in ("CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md"))]
+REFERENCE = sorted((ROOT / "docs" / "reference").glob("*.md"))
+OTHERS = [ROOT / name for name in ("CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md")]
+LINKING = [*PAGES, *REFERENCE, *OTHERS]
 
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 INDENTED = re.compile(r"(?:^    .+\n)+", re.MULTILINE)
@@ -27,8 +30,8 @@ INDENTED = re.compile(r"(?:^    .+\n)+", re.MULTILINE)
 PRINTING = re.compile(r"^\s*print\(.*\)\s+# ([^;]*)")
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
-# They have tests of their own: test_benchmarks.py, test_reproduce.py and test_startup.py.
-LONG = {"benchmark", "reproduce", "warmup"}
+# They have tests of their own: test_reproduce.py and test_startup.py.
+LONG = {"reproduce", "warmup"}
 
 # The reader's own maps, made here: the CRS, west and north, columns and rows of 100 m, bands.
 MAPS = {
@@ -137,6 +140,12 @@ def test_links_lead_somewhere(page):
             target = page.parent / place if place else page
             assert target.exists(), link
             assert not anchor or anchor in anchors(target), link
+
+
+def test_the_reference_holds_the_public_face_and_nothing_else():
+    pages = "\n".join(page.read_text() for page in REFERENCE)
+    names = re.findall(r"^::: terrapath\.(\w+)$", pages, re.MULTILINE)
+    assert sorted(names) == sorted({*tp.__all__} - {"__version__"})
 
 
 def test_there_are_examples():
