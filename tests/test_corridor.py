@@ -13,6 +13,7 @@ from terrapath.cli.main import run
 from terrapath.errors import InputError
 from terrapath.io.maps import count_cells
 from terrapath.planners import corridor, make_finished
+from terrapath.scenario import answers
 from terrapath.planners.corridor import Corridor, Part, factor, plan_in_corridor
 
 COUNT, CELL = 300, 10.0
