@@ -11,6 +11,7 @@ import pytest
 from benchmarks import bound, figures, fresh, large_maps, marching, paths, startup
 from benchmarks import report as reports
 from benchmarks import run as runs
+from benchmarks.__main__ import app
 from benchmarks.peers import SCIKIT_FMM, Peer
 from benchmarks.settings import SCENES, Scale, true_length
 from benchmarks.timing import Reading, Stopwatch, Target, Timing, percent
@@ -74,7 +75,7 @@ def runner(tmp_path):
 
 def test_the_command_writes_a_whole_report_and_measures_nothing_twice(tmp_path, tiny, monkeypatch):
     options = ["--quick", "--quiet", "--output", str(tmp_path)]
-    assert run(["benchmark", *ALONE, *options]) == 0
+    assert run([*ALONE, *options], app) == 0
     text = (tmp_path / "report.md").read_text()
     assert "**Reduced run.**" in text
     assert "## Machine and versions" in text
@@ -97,17 +98,17 @@ def test_the_command_writes_a_whole_report_and_measures_nothing_twice(tmp_path, 
     for kind in kinds:
         monkeypatch.setattr(kind, "measure", lambda self: pytest.fail("measured again"))
     monkeypatch.setattr(figures, "save_figure", lambda figure, path: None)
-    assert run(["benchmark", *ALONE, *options]) == 0
+    assert run([*ALONE, *options], app) == 0
     assert (tmp_path / "report.md").read_text() == text
     monkeypatch.setattr(runs, "_source_stamp", lambda: "other code")
-    assert run(["benchmark", *ALONE, *options]) == 2
+    assert run([*ALONE, *options], app) == 2
 
 
 def test_experiments_are_chosen_by_name(tmp_path, capsys):
     names = [*ALONE, "trees", "grids", "growth", "edges"]
     assert runs.chosen_experiments([]) == list(runs.EXPERIMENTS) == names
     assert runs.chosen_experiments(["path", "bound", "path"]) == ["bound", "path"]
-    assert run(["benchmark", "speed", "--output", str(tmp_path / "new")]) == 2
+    assert run(["speed", "--output", str(tmp_path / "new")], app) == 2
     message = capsys.readouterr().err
     assert "what='speed' is not known; choose some of bound, fast-marching, path" in message
     assert not (tmp_path / "new").exists()

@@ -8,9 +8,11 @@ import math
 import os
 import pickle
 import re
+import sys
 import zipfile
 from dataclasses import replace
 from fractions import Fraction
+from importlib.util import resolve_name
 from pathlib import Path
 
 import mpmath
@@ -32,6 +34,7 @@ from terrapath.certificates.search import Search, search_window
 from terrapath.geodesics.rays import trace_ray
 from terrapath.problem import scenes
 from terrapath.space.lattice import Lattice
+from terrapath.surface.bounds import Bounds
 from test_optimality import FLAT, LAYOUTS, REGION
 from test_random_problems import star
 
@@ -1089,10 +1092,10 @@ SENSELESS = {
     "nan": {"coefficients": np.full((12, 12), math.nan)},
     "inf": {"coefficients": np.full((12, 12), math.inf)},
     "float32": {"coefficients": np.zeros((12, 12), np.float32)},
-    "bounds beyond": {"bounds": tp.validation.Bounds(-2.0, -1.0, 11.0, 11.0)},
-    "bounds nan": {"bounds": tp.validation.Bounds(math.nan, -1.0, 11.0, 11.0)},
-    "bounds turned": {"bounds": tp.validation.Bounds(11.0, 11.0, -1.0, -1.0)},
-    "bounds empty": {"bounds": tp.validation.Bounds(-1.0, -1.0, -1.0, 11.0)},
+    "bounds beyond": {"bounds": Bounds(-2.0, -1.0, 11.0, 11.0)},
+    "bounds nan": {"bounds": Bounds(math.nan, -1.0, 11.0, 11.0)},
+    "bounds turned": {"bounds": Bounds(11.0, 11.0, -1.0, -1.0)},
+    "bounds empty": {"bounds": Bounds(-1.0, -1.0, -1.0, 11.0)},
     "core of halves": {"start_core": Core(0.5, 20.5, 0.5, 20.5)},
     "core below 0": {"start_core": Core(-1, 9, 0, 9)},
     "core too far": {"goal_core": Core(80, 10_000, 80, 10_000)},
@@ -1131,49 +1134,66 @@ def test_a_random_function_proves_only_what_is_true(seed):
 
 
 def imports_of(module):
-    """Modules of this package that a source file imports, by their last names."""
+    """Modules of this package that a source file imports, anywhere in it."""
     found = set()
     for node in ast.walk(ast.parse(Path(module.__file__).read_text())):
         if isinstance(node, ast.ImportFrom) and node.level:
-            inside = [node.module] if node.module else []
-            found.update(inside if node.module not in (None, "_kernels") else ())
-            if node.module in (None, "_kernels"):
-                found.update(
-                    f"{node.module or ''}.{alias.name}".lstrip(".") for alias in node.names
-                )
-        elif isinstance(node, ast.Import):
-            assert not any("terrapath" in alias.name for alias in node.names)
-    return found
+            base = resolve_name("." * node.level + (node.module or ""), module.__package__)
+            inside = [f"{base}.{alias.name}" for alias in node.names]
+            found.update(name if name in sys.modules else base for name in inside)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names = [alias.name for alias in node.names]
+            assert not any("terrapath" in name for name in [*names, getattr(node, "module", "")])
+    return {name.removeprefix("terrapath.") for name in found}
+
+
+SOLVERS = (
+    "terrapath.certificates.search",
+    "terrapath.distance",
+    "terrapath.geodesics",
+    "terrapath.planners",
+    "terrapath._kernels.distance",
+    "terrapath._kernels.geodesics",
+    "terrapath._kernels.planners",
+)
+
+
+def solvers_loaded_with(module):
+    loaded = in_another_process(f"import json, sys, {module}; print(json.dumps([*sys.modules]))")
+    assert module in loaded
+    return [name for name in loaded if f"{name}.".startswith(tuple(f"{s}." for s in SOLVERS))]
 
 
 def test_the_checker_shares_nothing_with_the_solver():
-    assert imports_of(certificate) == {"errors", "files", "problem", "proofs", "validation"}
-    assert imports_of(claims) == {
-        "_kernels.certificate",
-        "_kernels.surfaces",
+    assert imports_of(certificate) == {
+        "_support.files",
+        "certificates.claims",
         "errors",
-        "lattice",
         "problem",
+        "surface.bounds",
+        "validation",
+    }
+    assert imports_of(claims) == {
+        "_kernels.certificates.norms",
+        "_kernels.surface.surfaces",
+        "errors",
+        "problem",
+        "space.lattice",
+        "surface.bounds",
         "surface.costs",
         "validation",
     }
-    assert imports_of(kernels) == {"compiler", "surface_models", "surfaces", "taylor"}
-    assert imports_of(surface_models) == {"compiler", "dispatch", "surfaces", "taylor"}
-    assert imports_of(taylor) == {"compiler"}
-    loaded = in_another_process(
-        "import json, sys, terrapath.certificate\n"
-        "print(json.dumps([name for name in sys.modules if name.startswith('terrapath.')]))"
-    )
-    solvers = (
-        "eikonal",
-        "source_model",
-        "bounding",
-        "refinement",
-        "planners",
-        "geodesics",
-        "grid_search",
-    )
-    assert not [name for name in loaded if name.split(".")[-1] in solvers]
+    own = {"_kernels.certificates.surface_models", "_kernels.certificates.taylor"}
+    shared = {"_kernels.compiler", "_kernels.surface.surfaces"}
+    assert imports_of(kernels) == own | shared
+    assert imports_of(surface_models) == {
+        "_kernels.certificates.taylor",
+        "_kernels.dispatch",
+        *shared,
+    }
+    assert imports_of(taylor) == {"_kernels.compiler"}
+    assert not solvers_loaded_with("terrapath.certificates.certificate")
+    assert solvers_loaded_with("terrapath.certificates.search")
 
 
 # Files
@@ -1586,7 +1606,7 @@ TINY = """
 import json
 import terrapath as tp
 from terrapath.certificates.search import Search
-from terrapath.lattice import Lattice
+from terrapath.space.lattice import Lattice
 surface = tp.Surface.from_peaks([[(3.0, 0.5, 5.0, 5.0)], [(1.0, 0.2, 2.0, 7.0)]])
 problem = tp.Problem(surface, (1.0, 1.0), (9.0, 8.0), (0.0, 0.0, 10.0, 10.0), [tp.Circle(5, 2, 1)])
 made = Search(problem, Lattice.spanning(problem.bounds, 1.0), 16.0).certify()

@@ -130,7 +130,7 @@ def test_help_reads_no_scenario():
     program = (
         "import sys\nfrom terrapath.cli.main import run\n"
         "for command in ('plan', 'init', 'schema'):\n    assert run([command, '--help']) == 0\n"
-        "assert not {'terrapath.io.scenario', 'numpy', 'tomllib'} & set(sys.modules)\n"
+        "assert not {'terrapath.scenario.toml', 'numpy', 'tomllib'} & set(sys.modules)\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
