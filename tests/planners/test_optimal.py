@@ -7,13 +7,13 @@ import pytest
 import shapely
 
 import terrapath as tp
+from common import FLAT, REGION
 from terrapath.errors import UnfinishedWarning
 from terrapath.geodesics import alternatives
 from terrapath.problem import scenes
 
-START, GOAL, REGION = (0.0, 0.0), (10.0, 10.0), (-1.0, -1.0, 11.0, 11.0)
+START, GOAL = (0.0, 0.0), (10.0, 10.0)
 PAPER = [name for name in scenes.names() if name != "jacksboro"]
-FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
 
 SURFACES, BATCH = 200, 10
 COARSE = 0.1  # spacing of nodes that is enough to tell the routes apart

@@ -17,7 +17,7 @@ from rasterio.transform import from_origin
 
 from terrapath.cli.main import run
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 LINKING = [*PAGES, *(ROOT / n for n in ("CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/README.md"))]
 

@@ -15,12 +15,12 @@ from pyproj import CRS, Transformer
 from scipy.ndimage import binary_dilation, binary_erosion
 
 import terrapath as tp
-from helpers import one_line
+from common import REAL_MAPS, one_line
+from rasters import HEIGHTS, NORTH_UP, UTM, centres, write
 from terrapath.cli.main import run
 from terrapath.surface.grid import Grid
 from terrapath.surface.holes import continue_into_holes, fill_small_holes
 from terrapath.surface.resampling import resample
-from test_rasters import DATA, HEIGHTS, NORTH_UP, UTM, centres, write
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
 
@@ -753,7 +753,7 @@ def test_a_cloud_optimised_geotiff_is_read(tmp_path):
 
 
 def lunar(name):
-    path = DATA / name
+    path = REAL_MAPS / name
     if not path.exists():
         pytest.skip(f"{path} is not here")
     return path

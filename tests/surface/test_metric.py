@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import RectBivariateSpline
 
 import terrapath as tp
-from helpers import numbers, points_in
+from common import numbers, points_in
 from oracles import (
     exact_curve_length,
     metric_from_sympy,

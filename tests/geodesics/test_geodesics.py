@@ -15,7 +15,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
 import terrapath as tp
-from helpers import numbers, points_in
+from common import numbers, points_in
 from oracles import (
     christoffel_from_sympy,
     curvature_from_brioschi,
@@ -27,6 +27,7 @@ from oracles import (
     planar_speed,
 )
 from processes import in_another_process
+from reruns import SHORT_RAYS, short_rays
 from terrapath.geodesics import rays
 from terrapath.geodesics.rays import (
     christoffel_symbols,
@@ -723,41 +724,20 @@ def test_the_shortest_geodesic_of_a_random_surface_is_as_long_as_solve_bvp_says(
 # Other processes
 
 
-def short_rays():
-    """The same short rays on either class of surface, as plain lists."""
-    x = np.linspace(0.0, 6.0, 7)
-    grid = tp.Surface.from_grid(np.random.default_rng(1).normal(size=(2, 7, 7)), x, x)
-    peaks = peaks_surface(SIX_PEAKS)
-    found = []
-    for surface in (peaks, grid):
-        ray = trace_ray(surface, (2.0, 2.0), 0.4, 1.0, tolerance=1e-8)
-        found.append([ray.points.tolist(), ray.jacobi.tolist()])
-        found.append(christoffel_symbols(surface, (2.0, 2.5)).tolist())
-        found.append(float(gaussian_curvature(surface, (2.0, 2.5))))
-    return found
-
-
-# short_rays() and the cache's statistics
-RESULTS = (
-    "import json, test_geodesics as t; from terrapath._kernels import compiler\n"
-    "print(json.dumps([t.short_rays(), compiler.cache_statistics()]))"
-)
-
-
 def flattened(nested):
     return [x for part in nested for x in flattened(part)] if isinstance(nested, list) else [nested]
 
 
 def test_a_second_process_compiles_nothing_and_finds_the_same_bits():
     here = json.loads(json.dumps(short_rays()))  # which leaves the kernels in the cache
-    found, statistics = in_another_process(RESULTS)
+    found, statistics = in_another_process(SHORT_RAYS)
     assert found == here
     assert statistics["compiled"] == 0
     assert statistics["loaded"] > 0
 
 
 def test_plain_python_agrees_with_the_compiled_kernels():
-    found, statistics = in_another_process(RESULTS, NUMBA_DISABLE_JIT="1")
+    found, statistics = in_another_process(SHORT_RAYS, NUMBA_DISABLE_JIT="1")
     assert statistics == {"loaded": 0, "compiled": 0}
     np.testing.assert_allclose(flattened(found), flattened(short_rays()), rtol=1e-9, atol=1e-9)
 

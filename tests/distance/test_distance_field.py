@@ -12,14 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import terrapath as tp
+from common import FLAT, REGION
 from planner_oracles import visibility_length
 from terrapath.distance.field import Medium
 from terrapath.distance.source import model_source
 from terrapath.problem import scenes
 from terrapath.surface.bounds import Bounds
 
-FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
-REGION = (-1.0, -1.0, 11.0, 11.0)
 PAPER = [name for name in scenes.names() if name != "jacksboro"]
 
 

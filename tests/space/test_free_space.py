@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from shapely import affinity
 
 import terrapath as tp
+from common import FLAT
 from oracles import (
     boxes_of_mask,
     clearance_by_shapely,
@@ -380,7 +381,6 @@ def test_the_blocker_of_a_point_is_named():
 # Problems
 
 
-FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
 GRID = tp.Surface.from_grid(np.zeros((12, 12)), np.arange(12) - 0.5, np.arange(12) - 0.5)
 
 

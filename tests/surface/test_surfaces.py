@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 import terrapath as tp
-from helpers import numbers, one_line, points_in
+from common import numbers, one_line, points_in
 from oracles import peaks_derivative_from_sympy, peaks_expressions, peaks_function
 
 BOUNDS = (-1.0, -1.0, 11.0, 11.0)

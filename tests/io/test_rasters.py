@@ -12,51 +12,15 @@ from hypothesis import strategies as st
 from pyproj import CRS, Geod, Transformer
 
 import terrapath as tp
-from helpers import one_line
+from common import REAL_MAPS, one_line
 from oracles import is_blocked
+from rasters import HEIGHTS, NORTH_UP, UTM, centres, write
 from terrapath.io.maps import LayerSource
 from terrapath.surface.georeference import Georeference
 from terrapath.surface.raster import Raster
 
 # rasterio 1.4 multiplies Affine by "*" in its own modules, which affine 3 is about to retire.
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
-
-DATA = Path(__file__).parents[2] / "shared" / "data"
-UTM = "EPSG:32633"
-NORTH_UP = Affine(10.0, 0.0, 500_000.0, 0.0, -10.0, 4_000_120.0)
-
-# Twelve rows from north to south, ten columns.
-HEIGHTS = np.random.default_rng(0).normal(scale=5.0, size=(12, 10))
-
-
-def write(path, bands, transform=NORTH_UP, crs=UTM, units=(), **profile):
-    """A GeoTIFF of bands (rows, columns) or (bands, rows, columns)."""
-    bands = np.asarray(bands)
-    bands = bands[None] if bands.ndim == 2 else bands
-    with rasterio.open(
-        path,
-        "w",
-        driver=profile.pop("driver", "GTiff"),
-        count=len(bands),
-        height=bands.shape[1],
-        width=bands.shape[2],
-        dtype=profile.pop("dtype", bands.dtype),
-        transform=transform,
-        crs=crs,
-        **profile,
-    ) as dataset:
-        dataset.write(bands)
-        for band, unit in enumerate(units, start=1):
-            dataset.set_band_unit(band, unit)
-    return path
-
-
-def centres(transform=NORTH_UP, shape=(12, 10)):
-    """(rows, columns, 2): map coordinates of the cell centres."""
-    columns, rows = np.meshgrid(np.arange(shape[1]) + 0.5, np.arange(shape[0]) + 0.5)
-    t = transform
-    return np.stack([t.a * columns + t.b * rows + t.c, t.d * columns + t.e * rows + t.f], axis=-1)
-
 
 # Values
 
@@ -465,7 +429,7 @@ def test_a_crs_that_is_none_is_refused():
     [("herodotus_mons", 2, 256, 191, 53.634071), ("aristarchus_plateau", 3, 256, 244, 214.023094)],
 )
 def test_a_real_map_of_the_moon_is_read(name, band, columns, rows, cell):
-    path = DATA / f"{name}.tif"
+    path = REAL_MAPS / f"{name}.tif"
     if not path.exists():
         pytest.skip(f"{path} is not here")
     surface = tp.read_surface(path, height_band=band, layers={"rocks": f"{path}:{band + 1}*1000"})

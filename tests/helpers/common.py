@@ -1,7 +1,18 @@
-"""What tests of several subjects share: numbers and points to draw, messages to look at."""
+"""What tests of several subjects share: places, numbers and points to draw, messages to look at."""
+
+from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
+
+import terrapath as tp
+
+ROOT = Path(__file__).parents[2]
+# Maps of the Moon, beside a clone where somebody put them; who needs one skips without it.
+REAL_MAPS = ROOT.parent / "shared" / "data"
+
+FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
+REGION = (-1.0, -1.0, 11.0, 11.0)
 
 
 def numbers(low, high):

@@ -11,6 +11,7 @@ import shapely
 from pyproj import CRS, Transformer
 
 import terrapath as tp
+from common import REAL_MAPS
 from terrapath._support.files import require_writable, written_whole
 
 
@@ -168,9 +169,7 @@ def test_a_tilted_plane_is_climbed_by_its_slope():
 
 
 def test_lunar_routes_are_written_in_degrees_of_the_moon(tmp_path):
-    from pathlib import Path
-
-    lunar = Path(__file__).parents[2] / "shared" / "data" / "herodotus_mons.tif"
+    lunar = REAL_MAPS / "herodotus_mons.tif"
     if not lunar.exists():
         pytest.skip("the lunar map is not here")
     surface = tp.read_surface(lunar, height_band=2)

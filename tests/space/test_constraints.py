@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from matplotlib.cbook import get_sample_data
 from scipy import ndimage
 
 import terrapath as tp
+from common import FLAT, REAL_MAPS
 from oracles import boxes_of_mask
 from terrapath.space.constraints import inflated
 from terrapath.space.slope_limit import Steepness
@@ -21,11 +21,8 @@ from terrapath.surface.bounds import Bounds
 
 SIDE = 10.0
 BOUNDS = (0.0, 0.0, SIDE, SIDE)
-FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
 HILLS = tp.Surface.from_peaks([[(2.0, 0.3, 3.0, 4.0), (-1.5, 0.2, 7.0, 6.0)]])
 SCENES = 500
-
-DATA = Path(__file__).parents[2] / "shared" / "data"
 
 # What shapely itself may err by, as a share of the radius.
 ROUNDING = 1e-12
@@ -337,14 +334,14 @@ def test_a_route_on_a_real_map_keeps_to_the_slope_by_horn_and_by_differences():
 def test_routes_on_the_moon_keep_to_the_slope_by_the_raster(name, band, limit, start, goal):
     import rasterio
 
-    if not (DATA / name).exists():
+    if not (REAL_MAPS / name).exists():
         pytest.skip("the lunar maps are not here")
-    surface = tp.read_surface(DATA / name, height_band=band)
+    surface = tp.read_surface(REAL_MAPS / name, height_band=band)
     steep = {}
     for max_slope in (limit, None):
         problem = tp.Problem(surface, start, goal, max_slope=max_slope)
         points = tp.plan(problem, "fast-marching", refine=True).path.profile.points
-        with rasterio.open(DATA / name) as raster:
+        with rasterio.open(REAL_MAPS / name) as raster:
             heights = raster.read(band, masked=True).astype(float).filled(np.nan)
             rows, columns = rasterio.transform.rowcol(raster.transform, *points.T)
             along, across = np.gradient(heights, raster.res[0])

@@ -23,6 +23,8 @@ import shapely
 import certificate_oracles as oracles
 import planner_oracles
 import terrapath as tp
+from common import FLAT, REGION
+from layouts import LAYOUTS, star
 from oracles import great_circle
 from processes import in_another_process
 from terrapath._kernels.certificates import norms as kernels
@@ -35,8 +37,6 @@ from terrapath.geodesics.rays import trace_ray
 from terrapath.problem import scenes
 from terrapath.space.lattice import Lattice
 from terrapath.surface.bounds import Bounds
-from test_optimality import FLAT, LAYOUTS, REGION
-from test_random_problems import star
 
 SIDE = 10.0
 BOUNDS = (0.0, 0.0, SIDE, SIDE)

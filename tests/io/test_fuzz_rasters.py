@@ -6,22 +6,21 @@ In a process of its own: a crash of GDAL is a failure here too, and what it prin
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-HERE = Path(__file__).parent
+import fuzz_rasters
+
 MUTATIONS = 300  # of each file
 
 
 def run(seed):
     done = subprocess.run(
-        [sys.executable, str(HERE / "fuzz_rasters.py"), str(seed), str(MUTATIONS)],
+        [sys.executable, fuzz_rasters.__file__, str(seed), str(MUTATIONS)],
         capture_output=True,
         text=True,
         check=False,
         timeout=600,
-        cwd=HERE,
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return json.loads(done.stdout), done.stderr

@@ -16,6 +16,7 @@ from rasterio.transform import from_origin
 from typer.main import get_command
 
 import terrapath as tp
+from common import ROOT
 from terrapath.cli.main import app, run
 from terrapath.errors import InputError
 from terrapath.io.vectors.layers import read_layers
@@ -25,7 +26,6 @@ from terrapath.scenario.problem_options import LayerTable
 from terrapath.scenario.scenario import Scenario
 from terrapath.scenario.toml import read_scenario, scenario_schema
 
-ROOT = Path(__file__).parents[1]
 QUICK = ["--samples", "400", "--no-bound"]
 
 

@@ -6,7 +6,6 @@ import json
 import math
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,6 +28,7 @@ from benchmarks.exchange import discs_of, panel_of, write_problem
 from benchmarks.peers import OMPL_PYTHON, Peer
 from benchmarks.settings import Scale
 from benchmarks.timing import Target, Timing
+from common import ROOT
 from terrapath import Circle, Problem, Surface
 from terrapath.errors import InputError, TerrapathError
 from terrapath.paper.runner import Runner
@@ -364,7 +364,7 @@ def test_a_program_that_does_not_compile_is_left_out(tmp_path, monkeypatch):
 
 def test_a_program_needs_its_library(monkeypatch):
     # The sources are the repository's, wherever the package is installed.
-    monkeypatch.setattr(programs, "SOURCES", Path(__file__).parents[1] / "benchmarks" / "cpp")
+    monkeypatch.setattr(programs, "SOURCES", ROOT / "benchmarks" / "cpp")
     library = programs.Library("Nothing", ("no/such/header.h",), "NONE", ())
     program = programs.Program("Planners", "planners.cpp", library, "libnothing-dev")
     assert library.found_version is None

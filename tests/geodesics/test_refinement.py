@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 
 import planner_oracles
 import terrapath as tp
+from common import FLAT, REGION
 from oracles import (
     boxes_of_mask,
     geodesic_by_collocation,
@@ -27,8 +28,6 @@ from terrapath.geodesics.refinement.curve import spline_through
 from terrapath.problem import scenes
 from terrapath.surface import metric
 
-FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
-REGION = (-1.0, -1.0, 11.0, 11.0)
 START, GOAL = (0.0, 0.0), (10.0, 10.0)
 PAPER = [name for name in scenes.names() if name != "jacksboro"]
 

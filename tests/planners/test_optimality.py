@@ -11,6 +11,8 @@ import shapely
 
 import planner_oracles as oracles
 import terrapath as tp
+from common import FLAT, REGION
+from layouts import LAYOUTS
 from oracles import great_circle
 from terrapath.problem import scenes
 
@@ -147,29 +149,6 @@ def test_paths_meet_the_closed_form_from_above(function, truth, bounds, start, g
 
 
 # Flat ground with obstacles
-
-FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
-REGION = (-1.0, -1.0, 11.0, 11.0)
-LAYOUTS = {
-    "nothing": [],
-    "box": [shapely.box(3.0, 2.0, 8.0, 7.0)],
-    "corridor": [shapely.box(3.0, -2.0, 7.0, 6.8), shapely.box(3.0, 7.0, 7.0, 12.0)],
-    "wall of boxes": [shapely.box(4.0, -1.5 + 1.6 * k, 5.5, -0.2 + 1.6 * k) for k in range(8)],
-    "chicane": [shapely.box(2.0, -2.0, 3.0, 8.0), shapely.box(6.0, 1.0, 7.0, 12.0)],
-    "horseshoe": [
-        shapely.Polygon([(2, 2), (9, 2), (9, 9), (2, 9), (2, 8), (8, 8), (8, 3), (2, 3)])
-    ],
-    "courtyard": [
-        shapely.box(6.0, 6.0, 10.9, 10.9)
-        - shapely.box(7.0, 7.0, 10.4, 10.4)
-        - shapely.box(9.0, 5.0, 9.8, 7.5)
-    ],
-    "triangles": [
-        shapely.Polygon([(1, 4), (5, 1), (4.5, 5)]),
-        shapely.Polygon([(5.5, 5), (9, 4), (7, 9)]),
-        shapely.Polygon([(1, 7), (4, 6), (5, 10)]),
-    ],
-}
 
 
 @pytest.mark.parametrize("name", LAYOUTS)

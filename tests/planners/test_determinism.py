@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import shapely
 
 import terrapath as tp
 from planner_oracles import TREE_PLANNERS
 from processes import in_another_process
+from reruns import TREES, problems, trees
 from terrapath._kernels import compiler
 from terrapath.planners import tree_search
 from terrapath.problem import scenes
@@ -20,61 +20,16 @@ from terrapath.problem import scenes
 KERNELS = Path(compiler.__file__).parent
 
 
-def _problems():
-    obstacles = [
-        shapely.box(4.2, 4.3, 5.9, 6.1),
-        shapely.box(0.5, 6.0, 4.0, 9.5) - shapely.box(1.5, 7.0, 3.0, 8.5),
-        tp.Circle(7.5, 3.0, 0.9),
-    ]
-    x = np.linspace(-1.0, 11.0, 13)
-    values = np.random.default_rng(5).normal(size=(2, 13, 13))
-    blocked = np.zeros((13, 13), bool)
-    blocked[8, 9] = True
-    nodata = tp.Mask(blocked, x, x)
-    peaks = tp.Surface.from_peaks([scenes.FOUR_PEAKS, scenes.TWO_RESISTANCE_PEAKS])
-    spline = tp.Surface.from_grid(values, x, x, nodata=nodata)
-    return {
-        "peaks": tp.Problem(peaks, (0, 0), (10, 10), scenes.REGION, obstacles),
-        "spline": tp.Problem(spline, (0, 0), (10, 10), scenes.REGION, obstacles),
-    }
-
-
-def results(samples=300):
-    """Trees and lengths of every planner on small problems, as plain lists."""
-    found = {}
-    for place, problem in _problems().items():
-        for name in TREE_PLANNERS:
-            solution = tp.plan(problem, name, samples=samples, seed=6)
-            assert solution.path is not None
-            found[f"{place}, {name}"] = {
-                "points": solution.tree.points.tolist(),
-                "parents": solution.tree.parents.tolist(),
-                "costs": solution.tree.costs.tolist(),
-                "path": solution.path.points.tolist(),
-                "cost": solution.cost,
-                "length": solution.length,
-                "counters": solution.counters,
-            }
-    return found
-
-
-# results() and the cache's statistics
-RESULTS = (
-    "import json, test_determinism as t\n"
-    "print(json.dumps([t.results(), t.compiler.cache_statistics()]))"
-)
-
-
 @pytest.fixture(scope="module")
 def here():
-    return results()
+    return trees()
 
 
 @pytest.fixture(scope="module")
 def cold_and_warm(tmp_path_factory):
     """Two processes, one after the other, that share a kernel cache which was empty."""
     cache = str(tmp_path_factory.mktemp("kernels"))
-    return [in_another_process(RESULTS, NUMBA_CACHE_DIR=cache) for _ in range(2)]
+    return [in_another_process(TREES, NUMBA_CACHE_DIR=cache) for _ in range(2)]
 
 
 def assert_same_bits(a, b):
@@ -92,14 +47,14 @@ def assert_same_bits(a, b):
 
 @pytest.mark.parametrize("name", TREE_PLANNERS)
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others(name):
-    problem = _problems()["peaks"]
+    problem = problems()["peaks"]
     first, second = (tp.plan(problem, name, samples=2000, seed=3) for _ in range(2))
     assert_same_bits(first, second)
     assert first.cost != tp.plan(problem, name, samples=2000, seed=4).cost
 
 
 def test_no_global_random_state_is_read_or_changed():
-    problem = _problems()["peaks"]
+    problem = problems()["peaks"]
     np.random.seed(1)  # noqa: NPY002 (the global generator is what is tested)
     state = np.random.get_state()[1].copy()  # noqa: NPY002
     first = tp.RRTStar(samples=500).solve(problem)
@@ -111,7 +66,7 @@ def test_no_global_random_state_is_read_or_changed():
 @pytest.mark.parametrize("name", ["rrt-star-r", "rrt-star"])
 @pytest.mark.parametrize("chunk", [1, 97, 5000])
 def test_the_chunk_size_changes_no_bit(name, chunk, monkeypatch):
-    problem = _problems()["peaks"]
+    problem = problems()["peaks"]
     expected = tp.plan(problem, name, samples=1300, seed=9)
     monkeypatch.setattr(tree_search, "CHUNK", chunk)
     found = tp.plan(problem, name, samples=1300, seed=9)
@@ -121,7 +76,7 @@ def test_the_chunk_size_changes_no_bit(name, chunk, monkeypatch):
 
 @pytest.mark.parametrize("chunk", [1, 97, 5000])
 def test_the_chunk_size_does_not_change_the_path_of_rrt(chunk, monkeypatch):
-    problem = _problems()["peaks"]
+    problem = problems()["peaks"]
     expected = tp.RRT(samples=5000, seed=9).solve(problem)
     monkeypatch.setattr(tree_search, "CHUNK", chunk)
     found = tp.RRT(samples=5000, seed=9).solve(problem)
@@ -151,7 +106,7 @@ def test_a_longer_run_begins_as_the_shorter_one(options, monkeypatch):
 
 
 def test_another_process_finds_the_same_bits(here):
-    found, statistics = in_another_process(RESULTS)
+    found, statistics = in_another_process(TREES)
     assert found == here
     assert statistics["loaded"] + statistics["compiled"] > 0
 
@@ -171,7 +126,7 @@ def test_a_second_process_compiles_nothing(cold_and_warm):
 
 
 def test_plain_python_agrees_with_the_compiled_kernels(here):
-    found, statistics = in_another_process(RESULTS, NUMBA_DISABLE_JIT="1")
+    found, statistics = in_another_process(TREES, NUMBA_DISABLE_JIT="1")
     assert statistics == {"loaded": 0, "compiled": 0}
     assert found.keys() == here.keys()
     for case, expected in here.items():

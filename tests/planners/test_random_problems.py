@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import planner_oracles as oracles
 import terrapath as tp
+from layouts import star
 
 SIDE = 10.0
 BOUNDS = (0.0, 0.0, SIDE, SIDE)
@@ -50,15 +51,6 @@ class Case:
             surface = tp.Surface.from_grid(np.moveaxis(surface.values(grid), -1, 0), axis, axis)
         circles = [tp.Circle(*circle) for circle in self.circles]
         return tp.Problem(surface, self.start, self.goal, BOUNDS, [*self.polygons, *circles])
-
-
-def star(x, y, radii, turn, hole):
-    """A star-shaped polygon about (x, y); ``hole`` (0: none) is that share of it cut out."""
-    angles = turn + 2.0 * math.pi * np.arange(len(radii)) / len(radii)
-    ring = np.array(radii)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    centre = np.array([x, y])
-    holes = [centre + hole * ring] if hole > 0.0 else []
-    return shapely.Polygon(centre + ring, holes)
 
 
 # Made by Hypothesis

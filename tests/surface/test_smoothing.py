@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.ndimage import gaussian_filter1d
 
 import terrapath as tp
-from helpers import one_line, points_in
+from common import one_line, points_in
 from terrapath.paper import nonsmooth
 from terrapath.surface.smoothing import quantisation_step, scale_for_step, smooth
 

@@ -2,11 +2,12 @@
 
 import json
 import runpy
-from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parents[1] / "benchmarks" / "kernels"
+from common import ROOT
+
+FOLDER = ROOT / "benchmarks" / "kernels"
 CASES = runpy.run_path(str(FOLDER / "cases.py"))["CASES"]
 
 
