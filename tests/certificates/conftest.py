@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from certificate_cases import (
-    certified,
-    hills,
-)
+from certificate_cases import certified, hills
 from terrapath.problem import scenes
 
 

@@ -16,10 +16,7 @@ import numpy as np
 import pytest
 
 import terrapath as tp
-from certificate_cases import (
-    BOUNDS,
-    certified,
-)
+from certificate_cases import BOUNDS, certified
 from common import FLAT
 from processes import in_another_process
 from terrapath._kernels.certificates import norms as kernels

@@ -10,14 +10,7 @@ import pytest
 import shapely
 
 import terrapath as tp
-from certificate_cases import (
-    BOUNDS,
-    SIDE,
-    certified,
-    hills,
-    nudged,
-    resealed,
-)
+from certificate_cases import BOUNDS, SIDE, certified, hills, nudged, resealed
 from terrapath.certificates import certificate, claims
 from terrapath.certificates.certificate import fingerprint, seal_of
 from terrapath.certificates.claims import Core

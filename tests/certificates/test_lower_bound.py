@@ -12,12 +12,7 @@ import pytest
 import shapely
 
 import terrapath as tp
-from certificate_cases import (
-    BOUNDS,
-    ROUNDING,
-    SIDE,
-    certified,
-)
+from certificate_cases import BOUNDS, ROUNDING, SIDE, certified
 from common import FLAT
 from processes import in_another_process
 from terrapath.certificates import certificate

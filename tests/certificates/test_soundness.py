@@ -11,13 +11,7 @@ import shapely
 import certificate_oracles as oracles
 import planner_oracles
 import terrapath as tp
-from certificate_cases import (
-    BOUNDS,
-    ROUNDING,
-    SIDE,
-    certified,
-    random_surface,
-)
+from certificate_cases import BOUNDS, ROUNDING, SIDE, certified, random_surface
 from common import FLAT, REGION
 from layouts import LAYOUTS, star
 from oracles import great_circle

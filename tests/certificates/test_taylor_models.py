@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 
 import certificate_oracles as oracles
-from certificate_cases import (
-    ROUNDING,
-    square,
-)
+from certificate_cases import ROUNDING, square
 from terrapath._kernels.certificates import surface_models, taylor
 
 

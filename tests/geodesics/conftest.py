@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from geodesic_cases import (
-    cylinder,
-    sphere_cap,
-)
+from geodesic_cases import cylinder, sphere_cap
 
 
 @pytest.fixture(scope="session")

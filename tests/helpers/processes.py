@@ -7,18 +7,19 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-_PATH = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
+# Whatever package is tested here is tested there.
+PATH = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 def in_another_process(code, **environment):
-    """What a program that may import the tests prints, as JSON."""
+    """What a program that may import the helpers prints last, as JSON."""
     done = subprocess.run(
         [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": _PATH, **environment},
+        env={**os.environ, "PYTHONPATH": PATH, **environment},
         cwd=HERE,
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(done.stdout.splitlines()[-1])
