@@ -1,0 +1,32 @@
+"""What tests of several subjects share: places, numbers and points to draw, messages to look at."""
+
+from pathlib import Path
+
+import numpy as np
+from hypothesis import strategies as st
+
+import terrapath as tp
+
+ROOT = Path(__file__).parents[2]
+# Maps of the Moon, beside a clone where somebody put them; who needs one skips without it.
+REAL_MAPS = ROOT.parent / "shared" / "data"
+
+FLAT = tp.Surface.from_peaks([np.empty((0, 4))])
+REGION = (-1.0, -1.0, 11.0, 11.0)
+
+
+def numbers(low, high):
+    return st.floats(low, high, allow_subnormal=False)
+
+
+def points_in(bounds, count, seed=0):
+    """(count, 2): places in a box, the same for the same seed."""
+    return np.random.default_rng(seed).uniform(bounds[:2], bounds[2:], (count, 2))
+
+
+def one_line(caught):
+    """The message of an error, which is one line."""
+    text = str(caught.value)
+    assert text
+    assert "\n" not in text
+    return text

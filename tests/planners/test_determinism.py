@@ -1,0 +1,187 @@
+"""The same seed gives the same bits, in any process, with any cache and any chunk size."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import terrapath as tp
+from planner_oracles import TREE_PLANNERS
+from processes import in_another_process
+from reruns import TREES, problems, trees
+from terrapath._kernels import compiler
+from terrapath.planners import tree_search
+from terrapath.problem import scenes
+
+KERNELS = Path(compiler.__file__).parent
+
+
+@pytest.fixture(scope="module")
+def here():
+    return trees()
+
+
+@pytest.fixture(scope="module")
+def cold_and_warm(tmp_path_factory):
+    """Two processes, one after the other, that share a kernel cache which was empty."""
+    cache = str(tmp_path_factory.mktemp("kernels"))
+    return [in_another_process(TREES, NUMBA_CACHE_DIR=cache) for _ in range(2)]
+
+
+def assert_same_bits(a, b):
+    assert a.samples == b.samples
+    assert a.cost == b.cost
+    assert a.counters == b.counters
+    np.testing.assert_array_equal(a.path.points, b.path.points)
+    np.testing.assert_array_equal(a.tree.points, b.tree.points)
+    np.testing.assert_array_equal(a.tree.parents, b.tree.parents)
+    np.testing.assert_array_equal(a.tree.costs, b.tree.costs)
+
+
+# The same seed
+
+
+@pytest.mark.parametrize("name", TREE_PLANNERS)
+def test_the_same_seed_gives_the_same_bits_and_another_seed_others(name):
+    problem = problems()["peaks"]
+    first, second = (tp.plan(problem, name, samples=2000, seed=3) for _ in range(2))
+    assert_same_bits(first, second)
+    assert first.cost != tp.plan(problem, name, samples=2000, seed=4).cost
+
+
+def test_no_global_random_state_is_read_or_changed():
+    problem = problems()["peaks"]
+    np.random.seed(1)  # noqa: NPY002 (the global generator is what is tested)
+    state = np.random.get_state()[1].copy()  # noqa: NPY002
+    first = tp.RRTStar(samples=500).solve(problem)
+    np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
+    np.random.seed(2)  # noqa: NPY002
+    assert_same_bits(first, tp.RRTStar(samples=500).solve(problem))
+
+
+@pytest.mark.parametrize("name", ["rrt-star-r", "rrt-star"])
+@pytest.mark.parametrize("chunk", [1, 97, 5000])
+def test_the_chunk_size_changes_no_bit(name, chunk, monkeypatch):
+    problem = problems()["peaks"]
+    expected = tp.plan(problem, name, samples=1300, seed=9)
+    monkeypatch.setattr(tree_search, "CHUNK", chunk)
+    found = tp.plan(problem, name, samples=1300, seed=9)
+    assert_same_bits(expected, found)
+    assert len(found.history.samples) == -(-1300 // chunk)
+
+
+@pytest.mark.parametrize("chunk", [1, 97, 5000])
+def test_the_chunk_size_does_not_change_the_path_of_rrt(chunk, monkeypatch):
+    problem = problems()["peaks"]
+    expected = tp.RRT(samples=5000, seed=9).solve(problem)
+    monkeypatch.setattr(tree_search, "CHUNK", chunk)
+    found = tp.RRT(samples=5000, seed=9).solve(problem)
+    np.testing.assert_array_equal(expected.path.points, found.path.points)
+    assert expected.cost == found.cost
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"radius_factor": 0.5}, {"informed": False}, {"step": 0.3}]
+)
+def test_a_longer_run_begins_as_the_shorter_one(options, monkeypatch):
+    problem = scenes.load("six-peaks")
+    for seed in range(6):
+        for samples in (300, 700):
+            monkeypatch.setattr(tree_search, "CHUNK", samples)
+            short = tp.RRTStar(samples=samples, seed=seed, **options).solve(problem)
+            long = tp.RRTStar(samples=8 * samples, seed=seed, **options).solve(
+                problem, callback=lambda progress, n=samples: progress.samples >= n
+            )
+            assert long.samples == samples
+            np.testing.assert_array_equal(long.tree.points, short.tree.points)
+            np.testing.assert_array_equal(long.tree.parents, short.tree.parents)
+            np.testing.assert_array_equal(long.tree.costs, short.tree.costs)
+
+
+# Other processes
+
+
+def test_another_process_finds_the_same_bits(here):
+    found, statistics = in_another_process(TREES)
+    assert found == here
+    assert statistics["loaded"] + statistics["compiled"] > 0
+
+
+def test_kernels_compiled_afresh_find_the_same_bits_as_kernels_from_the_cache(here, cold_and_warm):
+    (cold, cold_statistics), (warm, _) = cold_and_warm
+    assert cold_statistics["compiled"] > 0
+    assert cold == here
+    assert warm == here
+
+
+def test_a_second_process_compiles_nothing(cold_and_warm):
+    (_, cold), (_, warm) = cold_and_warm
+    assert cold["compiled"] > 0
+    assert warm["compiled"] == 0
+    assert warm["loaded"] > 0
+
+
+def test_plain_python_agrees_with_the_compiled_kernels(here):
+    found, statistics = in_another_process(TREES, NUMBA_DISABLE_JIT="1")
+    assert statistics == {"loaded": 0, "compiled": 0}
+    assert found.keys() == here.keys()
+    for case, expected in here.items():
+        assert found[case]["parents"] == expected["parents"], case
+        assert found[case]["counters"] == expected["counters"], case
+        for key in ("points", "costs", "path", "cost", "length"):
+            np.testing.assert_allclose(found[case][key], expected[key], rtol=1e-9, atol=1e-9)
+
+
+# The stamp of the cache
+
+
+@pytest.mark.parametrize("module", sorted(path.name for path in KERNELS.glob("*.py")))
+def test_a_comment_in_any_kernel_module_changes_the_stamp(module, tmp_path):
+    shutil.copytree(KERNELS, tmp_path / "kernels", ignore=shutil.ignore_patterns("__pycache__"))
+    spec = importlib.util.spec_from_file_location(
+        "terrapath._kernels.copied", tmp_path / "kernels" / "compiler.py"
+    )
+    copied = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(copied)
+    before = copied._package_stamp()
+    assert before == compiler._package_stamp()
+    source = tmp_path / "kernels" / module
+    source.write_text(source.read_text() + "# changed\n")
+    assert copied._package_stamp() != before
+
+
+CALLEE = "from .compiler import kernel\n\n@kernel\ndef callee(x):\n    return x + {}\n"
+CALLER = (
+    "from .callee import callee\nfrom .compiler import kernel\n\n"
+    "@kernel\ndef caller(x):\n    return 2.0 * callee(x)\n"
+)
+CALL = (
+    "import json, sys; sys.path.insert(0, {!r})\n"
+    "from copied.caller import caller; from copied.compiler import cache_statistics\n"
+    "print(json.dumps([caller(3.0), cache_statistics()]))"
+)
+
+
+def test_an_edited_callee_in_another_module_makes_its_caller_stale(tmp_path):
+    package = tmp_path / "copied"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    for module in ("compiler.py", "signatures.py"):
+        shutil.copy(KERNELS / module, package)
+    (package / "callee.py").write_text(CALLEE.format("1.0"))
+    (package / "caller.py").write_text(CALLER)
+    call = CALL.format(str(tmp_path))
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    value, statistics = in_another_process(call, **environment)
+    assert value == 8.0
+    assert statistics["compiled"] > 0
+    value, statistics = in_another_process(call, **environment)
+    assert (value, statistics["compiled"]) == (8.0, 0)
+    (package / "callee.py").write_text(CALLEE.format("10.0"))
+    value, statistics = in_another_process(call, **environment)
+    assert value == 26.0
+    assert statistics["compiled"] > 0
