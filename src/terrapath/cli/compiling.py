@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from .bars import is_watched
 from .remarks import remark
 
-# Where `_kernels/compiler.py` logs each kernel that the cache lacks.
+if TYPE_CHECKING:
+    from ..planners.base import Callback, Progress
+
+# Where `_kernels/cache.py` logs each kernel that the cache lacks.
 LOGGER = "terrapath.kernels"
 
 
@@ -34,3 +38,30 @@ def compiling_told(quiet: bool = False) -> Iterator[None]:
     finally:
         logger.removeHandler(teller)
         logger.setLevel(before)
+
+
+@contextmanager
+def bound_compiled_beside(
+    surface_class: str, wanted: bool = True
+) -> Iterator[Callable[[Callback | None], Callback | None]]:
+    """Compile what proves the bound on a second core, while the planner's kernels are compiled.
+
+    Gives what a planner's callback is handed through: it waits for them when the bound is begun.
+    """
+    from ..planners.base import PROVING
+    from ..second_core import SecondCore, rehearsal_name
+
+    if not wanted:
+        yield lambda callback: callback
+        return
+    with SecondCore(rehearsal_name("lower bounds", surface_class)) as second:
+
+        def joined(callback: Callback | None) -> Callback:
+            def watch(progress: Progress) -> bool:
+                if progress.stage == PROVING:
+                    second.wait()
+                return callback is not None and bool(callback(progress))
+
+            return watch
+
+        yield joined

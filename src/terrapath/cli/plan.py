@@ -11,7 +11,7 @@ import typer
 from ..errors import InputError
 from ..options.problem import Point
 from ..options.scenario import Scenario
-from .compiling import compiling_told
+from .compiling import bound_compiled_beside, compiling_told
 from .exit_codes import ExitCode
 from .options import Where, with_options
 from .outputs import RouteOutputs
@@ -76,13 +76,22 @@ def _solve(planner: Finished, asked: Itinerary, every: bool, quiet: bool) -> Ans
     from ..planners import nearest, plan_goals, plan_tour
     from .progress import progress_bar
 
-    with progress_bar(asked.problem, quiet) as callback:
+    surface_class = type(asked.problem.surface.data).__name__.lower()
+    with (
+        bound_compiled_beside(surface_class, _is_bounded(planner)) as joined,
+        progress_bar(asked.problem, quiet) as shown,
+    ):
+        callback = joined(shown)
         if len(asked.goals) == 1:
             return Answer(plan_tour(asked.problem, planner, asked.via, callback=callback))
         goals = plan_goals(
             asked.problem, planner, asked.goals, asked.via, every=every, callback=callback
         )
         return Answer(nearest(goals), goals)
+
+
+def _is_bounded(planner: Finished) -> bool:
+    return planner.bound or planner.target_gap is not None
 
 
 def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
@@ -116,14 +125,17 @@ def _solve_in_corridor(
         return asked.problem, asked.via
 
     width = question.scenario.planner.corridor
-    with progress_bar(None, quiet) as callback:
+    with (
+        bound_compiled_beside("spline", _is_bounded(planner)) as joined,
+        progress_bar(None, quiet) as shown,
+    ):
         return Answer(
             plan_in_corridor(
                 pose,
                 planner,
                 cells,
                 half_width=width if isinstance(width, float) else None,
-                callback=callback,
+                callback=joined(shown),
             )
         )
 
