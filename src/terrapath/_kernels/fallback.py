@@ -18,7 +18,7 @@ from ..errors import KernelWarning
 
 # The first version of Numba that linking is tested with, and the first that it is not tested
 # with any more. pyproject.toml declares the same, and a test holds them together.
-TESTED_FROM, TESTED_BELOW = (0, 62), (0, 69)
+TESTED_FROM, TESTED_BELOW = (0, 63), (0, 69)
 
 # Why linking was left, if it was.
 _reasons: list[str] = []
