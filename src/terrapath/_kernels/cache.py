@@ -125,7 +125,8 @@ def _write(path: Path, content: bytes) -> None:
         temporary.write_bytes(_checksum(path, content) + content)
         temporary.replace(path)
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
         raise
 
 

@@ -25,6 +25,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.typing.context import Context
 
+from ..errors import KernelWarning
 from .cache import KernelCache
 from .fallback import falling_back, is_plain
 from .signatures import Target, Typing
@@ -231,6 +232,8 @@ class LinkedKernel(CPUDispatcher):
             return self._compile_plainly(sig)
         try:
             return super().compile(sig)
+        except KernelWarning:  # an error where the caller asked for that
+            raise
         except Exception as error:
             with falling_back(error):
                 return self._compile_plainly(sig)
