@@ -38,6 +38,10 @@ class TerrapathWarning(UserWarning):
     """Base of every warning that Terrapath gives on purpose. The command shows it as one line."""
 
 
+class KernelWarning(TerrapathWarning, RuntimeWarning):
+    """Kernels are compiled more slowly or more often than they could be."""
+
+
 class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded, and is left out or given as it was before."""
 

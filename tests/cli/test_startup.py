@@ -2,19 +2,20 @@
 
 import json
 import logging
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from numba import config
 
+from kernel_copies import copy_machinery
 from processes import in_another_process
-from terrapath._kernels import compiler, signatures
+from terrapath._kernels import cache, compiler
 from terrapath.cli import console
 from terrapath.cli.main import run
 from terrapath.errors import InputError
-from terrapath.planners import warmup
+from terrapath.planners import second_core, warmup
 from terrapath.surface import Surface
 
 # What is said
@@ -63,9 +64,9 @@ def test_compiling_is_told_once_where_it_happens_and_somebody_watches(
     assert not logging.getLogger(console.LOGGER).handlers
 
 
-CALLEE = "from .compiler import kernel\n\n@kernel\ndef callee(x, n):\n    return x * (n + 1)\n"
+CALLEE = "@kernel\ndef callee(x, n):\n    return x * (n + 1)\n"
 CALLER = (
-    "import numpy as np\nfrom .callee import callee\nfrom .compiler import kernel\n\n"
+    "import numpy as np\nfrom copied._kernels.callee import callee\n\n"
     "@kernel\ndef caller(x, n):\n    return callee(x, 2) + callee(x, n) + callee(x, np.int32(n))\n"
 )
 CALL = (
@@ -74,24 +75,18 @@ CALL = (
     "class Listener(logging.Handler):\n"
     "    def emit(self, record): told.append(record.getMessage())\n"
     "logger = logging.getLogger({!r}); logger.setLevel('INFO'); logger.addHandler(Listener())\n"
-    "from copied.caller import caller; from copied.callee import callee\n"
-    "from copied import compiler\n"
+    "from copied._kernels.caller import caller; from copied._kernels.callee import callee\n"
+    "from copied._kernels import cache\n"
     "first = caller(1.0, 3); told_first = list(told); second = callee(1.0, 3)\n"
-    "parts = len(callee.part().overloads)\n"
-    "print(json.dumps([first, second, told_first, told, parts, len(compiler.cached_files())]))"
+    "parts = len(callee.part.overloads)\n"
+    "print(json.dumps([first, second, told_first, told, parts, len(cache.kept_files())]))"
 )
 
 
 @pytest.fixture
 def call(tmp_path):
     """A package of two kernels, one of which calls the other, in processes that share a cache."""
-    package = tmp_path / "copied"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    for module in (compiler, signatures):
-        shutil.copy(module.__file__, package)
-    (package / "callee.py").write_text(CALLEE)
-    (package / "caller.py").write_text(CALLER)
+    copy_machinery(tmp_path, callee=CALLEE, caller=CALLER)
     code = CALL.format(str(tmp_path), console.LOGGER)
     return lambda: in_another_process(code, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
 
@@ -102,25 +97,29 @@ def test_a_kernel_that_kernels_call_is_compiled_by_itself_only_for_python(call):
     assert told_first == ["compiling caller"]
     assert told == ["compiling caller", "compiling callee"]
     assert parts == 1  # one for integers of all widths
-    assert files == 4  # an index and machine code of each
+    assert files == 2  # one of each
     first, second, told_first, told, parts, files = call()
-    assert (first, second, told, parts, files) == (11.0, 4.0, [], 0, 4)
+    assert (first, second, told, parts, files) == (11.0, 4.0, [], 0, 2)
 
 
-ALLOCATING = (
-    "import numpy as np\nfrom .compiler import allocating_kernel, kernel\n\n"
-    "@allocating_kernel\ndef summed(n):\n    return np.ones(n).sum()\n\n"
-    "@kernel\ndef doubled(n):\n    return 2.0 * summed(n)\n"
-)
+ALLOCATING = """
+import numpy as np
+
+@allocating_kernel
+def summed(n):
+    return np.ones(n).sum()
+
+@kernel
+def doubled(n):
+    return 2.0 * summed(n)
+"""
 
 
-def test_a_kernel_is_loaded_without_what_compiles_it(call, tmp_path):
-    call()
-    (tmp_path / "copied" / "allocating.py").write_text(ALLOCATING)
+def test_a_kernel_is_loaded_without_what_compiles_it(tmp_path):
+    copy_machinery(tmp_path, allocating=ALLOCATING)
     code = (
         f"import json, sys; sys.path.insert(0, {str(tmp_path)!r})\n"
-        "from copied.allocating import doubled\n"
-        "from copied.compiler import cache_statistics\n"
+        "from copied._kernels.allocating import cache_statistics, doubled\n"
         "print(json.dumps([doubled(3), cache_statistics(), sorted(sys.modules)]))"
     )
     found = [in_another_process(code, NUMBA_CACHE_DIR=str(tmp_path / "cache")) for _ in range(2)]
@@ -130,21 +129,6 @@ def test_a_kernel_is_loaded_without_what_compiles_it(call, tmp_path):
     compiling = {"numba.np.arraymath", "numba.np.linalg", "scipy.linalg"}
     assert compiling <= set(modules[0])
     assert not compiling & set(modules[1])
-
-
-def test_processes_that_compile_at_once_do_not_write_to_the_same_file(tmp_path):
-    files = [compiler._CacheFile(str(tmp_path), "kernel-1", "stamp") for _ in range(2)]
-    # Both have read the index before either writes it.
-    for file in files:
-        file._load_index = dict
-    for file, key in zip(files, ("float", "int"), strict=True):
-        file.save(key, f"code for {key}")
-    fresh = compiler._CacheFile(str(tmp_path), "kernel-1", "stamp")
-    assert fresh.load("int") == "code for int"
-    assert fresh.load("float") is None  # lost, and so compiled again; not the other's code
-    fresh.save("float", "code for float")
-    assert [fresh.load(key) for key in ("float", "int")] == ["code for float", "code for int"]
-    assert compiler._CacheFile(str(tmp_path), "kernel-1", "other").load("int") is None
 
 
 # terrapath warmup
@@ -157,17 +141,13 @@ def kitchen(tmp_path, monkeypatch):
 
     def rehearse(name):
         rehearsed.append(name)
-        (tmp_path / f"{name}.nbc").write_bytes(bytes(1_000_000))
+        end = cache._short(cache.environment())
+        cache._write(tmp_path / f"{name}.{end}.key.nbc", bytes(1_000_000))
 
     work = [warmup.Rehearsal(name, lambda name=name: rehearse(name)) for name in ("one", "two")]
     monkeypatch.setattr(warmup, "rehearsals", lambda: work)
-    monkeypatch.setattr(compiler, "cache_directory", lambda: tmp_path)
-    monkeypatch.setattr(
-        compiler, "cached_files", lambda: sorted(path.name for path in tmp_path.glob("*.nbc"))
-    )
-    monkeypatch.setattr(
-        compiler, "cache_statistics", lambda: {"loaded": 0, "compiled": len(rehearsed)}
-    )
+    monkeypatch.setattr(cache, "directory", lambda: tmp_path)
+    monkeypatch.setattr(second_core, "cores", lambda: 1)
     return rehearsed
 
 
@@ -200,24 +180,40 @@ def spoil_content(folder):
 
 
 def lose_a_kernel(folder):
-    (folder / "one.nbc").unlink()
+    next(folder.glob("one.*.nbc")).unlink()
 
 
-@pytest.mark.parametrize("spoil", [spoil_list, spoil_content, lose_a_kernel])
-def test_a_cache_that_lacks_something_is_warmed_again(spoil, kitchen, tmp_path):
+def damage_a_kernel(folder):
+    kernel = next(folder.glob("one.*.nbc"))
+    content = bytearray(kernel.read_bytes())
+    content[500] ^= 1
+    kernel.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "compiled"),
+    [(spoil_list, 0), (spoil_content, 0), (lose_a_kernel, 1), (damage_a_kernel, 1)],
+)
+def test_a_cache_that_lacks_something_is_warmed_again(spoil, compiled, kitchen, tmp_path):
     warmup.warm_up()
     spoil(tmp_path)
-    assert warmup.warm_up().compiled == 2
+    assert warmup.warm_up().compiled == compiled
     assert kitchen == ["one", "two"] * 2
     assert warmup.warm_up().compiled == 0
 
 
 def test_other_kernels_or_another_compiler_are_warmed_anew(kitchen, monkeypatch):
     warmup.warm_up()
-    assert compiler._STAMP in compiler.cache_key()
-    monkeypatch.setattr(compiler, "cache_key", lambda: "another")
+    assert cache.STAMP in cache.environment()
+    monkeypatch.setattr(cache, "environment", lambda: "another")
     warmup.warm_up()
     assert kitchen == ["one", "two"] * 2
+
+
+def test_kernels_that_cannot_be_kept_are_one_clear_line(kitchen, monkeypatch, capsys):
+    monkeypatch.setattr(cache, "unkept", lambda: "no room; set NUMBA_CACHE_DIR")
+    assert run(["warmup"]) == 2
+    assert capsys.readouterr().err == "terrapath: no room; set NUMBA_CACHE_DIR\n"
 
 
 def test_an_interrupt_leaves_no_list(kitchen, tmp_path, monkeypatch):
@@ -230,7 +226,7 @@ def test_an_interrupt_leaves_no_list(kitchen, tmp_path, monkeypatch):
 
 
 def test_without_a_compiler_there_is_nothing_to_warm(monkeypatch, capsys):
-    monkeypatch.setattr(compiler, "_kernels", [])
+    monkeypatch.setattr(config, "DISABLE_JIT", 1)
     assert compiler.cache_directory() is None
     with pytest.raises(InputError, match="NUMBA_DISABLE_JIT is set"):
         warmup.warm_up()
@@ -242,7 +238,8 @@ def test_both_classes_of_surface_are_rehearsed_by_every_kind_of_work():
     classes = {type(make().data) for make in warmup.SURFACES.values()}
     assert {kind.__name__ for kind in classes} == {"Peaks", "Spline"}
     assert all(isinstance(make(), Surface) for make in warmup.SURFACES.values())
-    assert warmup.SURFACES["splines"]().least_cost != 1.0  # with costs
+    assert warmup.SURFACES["spline"]().least_cost != 1.0  # with costs
+    assert {kind.__name__.lower() for kind in classes} == set(warmup.SURFACES)
     assert len(warmup.rehearsals()) == len(warmup.KINDS) * len(warmup.SURFACES)
 
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import terrapath as tp
+from kernel_copies import KERNELS, copy_machinery
 from planner_oracles import TREE_PLANNERS
 from processes import in_another_process
 from reruns import TREES, problems, trees
-from terrapath._kernels import compiler
+from terrapath._kernels import cache
 from terrapath.planners import tree_search
 from terrapath.problem import scenes
-
-KERNELS = Path(compiler.__file__).parent
 
 
 @pytest.fixture(scope="module")
@@ -139,49 +136,61 @@ def test_plain_python_agrees_with_the_compiled_kernels(here):
 # The stamp of the cache
 
 
-@pytest.mark.parametrize("module", sorted(path.name for path in KERNELS.glob("*.py")))
-def test_a_comment_in_any_kernel_module_changes_the_stamp(module, tmp_path):
-    shutil.copytree(KERNELS, tmp_path / "kernels", ignore=shutil.ignore_patterns("__pycache__"))
-    spec = importlib.util.spec_from_file_location(
-        "terrapath._kernels.copied", tmp_path / "kernels" / "compiler.py"
-    )
-    copied = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(copied)
-    before = copied._package_stamp()
-    assert before == compiler._package_stamp()
-    source = tmp_path / "kernels" / module
-    source.write_text(source.read_text() + "# changed\n")
-    assert copied._package_stamp() != before
+@pytest.fixture
+def copied_kernels(tmp_path):
+    """All kernel modules, and one in a sub-folder."""
+    copied = tmp_path / "kernels"
+    shutil.copytree(KERNELS, copied, ignore=shutil.ignore_patterns("__pycache__"))
+    (copied / "deep" / "down").mkdir(parents=True)
+    (copied / "deep" / "down" / "added.py").touch()
+    return copied
 
 
-CALLEE = "from .compiler import kernel\n\n@kernel\ndef callee(x):\n    return x + {}\n"
+def test_a_comment_in_any_kernel_module_changes_the_stamp(copied_kernels):
+    stamps = {cache.package_stamp(copied_kernels)}
+    sources = sorted(copied_kernels.rglob("*.py"))
+    for source in sources:
+        source.write_text(source.read_text() + "# changed\n")
+        stamps.add(cache.package_stamp(copied_kernels))
+    assert len(stamps) == len(sources) + 1
+
+
+def test_the_stamp_is_of_the_names_too_and_the_same_wherever_the_kernels_are(copied_kernels):
+    shutil.rmtree(copied_kernels / "deep")
+    assert cache.package_stamp(copied_kernels) == cache.STAMP == cache.package_stamp()
+    (copied_kernels / "four.py").rename(copied_kernels / "five.py")
+    assert cache.package_stamp(copied_kernels) != cache.STAMP
+
+
+CALLEE = "@kernel\ndef callee(x):\n    return x + {}\n"
 CALLER = (
-    "from .callee import callee\nfrom .compiler import kernel\n\n"
-    "@kernel\ndef caller(x):\n    return 2.0 * callee(x)\n"
+    "from copied._kernels.{} import callee\n\n@kernel\ndef caller(x):\n    return 2.0 * callee(x)\n"
 )
 CALL = (
-    "import json, sys; sys.path.insert(0, {!r})\n"
-    "from copied.caller import caller; from copied.compiler import cache_statistics\n"
-    "print(json.dumps([caller(3.0), cache_statistics()]))"
+    "import json, sys, warnings; sys.path.insert(0, {!r})\n"
+    "import numba; numba.__version__ = {!r} or numba.__version__\n"
+    "warnings.simplefilter('ignore')\n"
+    "from copied._kernels.caller import caller\n"
+    "from copied._kernels.compiler import cache_statistics, is_plain\n"
+    "print(json.dumps([caller(3.0), cache_statistics(), is_plain()]))"
 )
 
 
-def test_an_edited_callee_in_another_module_makes_its_caller_stale(tmp_path):
-    package = tmp_path / "copied"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    for module in ("compiler.py", "signatures.py"):
-        shutil.copy(KERNELS / module, package)
-    (package / "callee.py").write_text(CALLEE.format("1.0"))
-    (package / "caller.py").write_text(CALLER)
-    call = CALL.format(str(tmp_path))
+@pytest.mark.parametrize("version", ["", "99.0"])
+@pytest.mark.parametrize("folder", ["", "surface"])
+def test_an_edited_callee_in_another_module_makes_its_caller_stale(folder, version, tmp_path):
+    callee = f"{folder}.callee".lstrip(".")
+    modules = {callee.replace(".", "__"): CALLEE.format("1.0"), "caller": CALLER.format(callee)}
+    kernels = copy_machinery(tmp_path, **modules)
+    call = CALL.format(str(tmp_path), version)
     environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
-    value, statistics = in_another_process(call, **environment)
-    assert value == 8.0
+    value, statistics, plain = in_another_process(call, **environment)
+    assert (value, plain) == (8.0, bool(version))
     assert statistics["compiled"] > 0
-    value, statistics = in_another_process(call, **environment)
+    value, statistics, _ = in_another_process(call, **environment)
     assert (value, statistics["compiled"]) == (8.0, 0)
-    (package / "callee.py").write_text(CALLEE.format("10.0"))
-    value, statistics = in_another_process(call, **environment)
+    source = kernels / f"{callee.replace('.', '/')}.py"
+    source.write_text(source.read_text().replace("1.0", "10.0"))
+    value, statistics, _ = in_another_process(call, **environment)
     assert value == 26.0
     assert statistics["compiled"] > 0

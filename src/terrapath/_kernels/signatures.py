@@ -11,6 +11,7 @@ from typing import Any
 
 from numba import types
 from numba.core.cpu import CPUContext
+from numba.core.datamodel import models, register_default
 from numba.core.typing.context import Context
 from numba.core.typing.templates import Signature
 
@@ -41,6 +42,9 @@ class _Remembered(types.Function):
 
     def get_call_type(self, context: Typing, args: tuple[types.Type, ...], kws: Any) -> Any:
         return context.resolve_function_type(self._function, args, kws)
+
+
+register_default(_Remembered)(models.OpaqueModel)  # as of any function: it has no value
 
 
 @cache

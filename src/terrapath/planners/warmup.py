@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
+import sys
+import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,20 +14,21 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from .._kernels import compiler
+from .._kernels import cache, compiler
 from .._support.files import written_whole
 from .._support.watching import Watch, watch_nothing
 from ..certificates.search import lower_bound
 from ..distance.field import distance_field
-from ..errors import InputError
+from ..errors import InputError, KernelWarning, MapError
+from ..geodesics import christoffel_symbols, gaussian_curvature
 from ..geodesics.alternatives import alternatives
-from ..geodesics.rays import christoffel_symbols, gaussian_curvature
 from ..geodesics.refinement import refine
 from ..problem import Problem
 from ..space.free_space import Circle
 from ..surface import Mask, Surface
 from ..surface.metric import chord, line_r
-from . import plan
+from .registry import plan
+from .second_core import SecondCore, rehearsal_name, serve_first_core
 
 # What was compiled for which kernels; it lies beside them.
 LIST_FILE = "terrapath-warm.json"
@@ -63,7 +67,8 @@ def spline() -> Surface:
     return Surface.from_grid(values, axis, axis, kinds=["rise", "cost"])
 
 
-SURFACES: dict[str, Callable[[], Surface]] = {"peaks": peaks, "splines": spline}
+# By the name of the class.
+SURFACES: dict[str, Callable[[], Surface]] = {"peaks": peaks, "spline": spline}
 
 
 def _open_ground(surface: Surface) -> Problem:
@@ -82,6 +87,7 @@ def _grow(surface: Surface) -> None:
 
 
 def _march(surface: Surface) -> None:
+    plan(_open_ground(surface), "fast-marching", spacing=0.5, refine=True)
     problem = _with_obstacles(surface)
     distance_field(surface, START, bounds=problem.bounds, spacing=0.5).at([GOAL, START])
     path = plan(problem, "fast-marching", spacing=0.5).path
@@ -91,9 +97,7 @@ def _march(surface: Surface) -> None:
 
 def _prove(surface: Surface) -> None:
     problem = _open_ground(surface)
-    path = plan(problem, "fast-marching", spacing=0.5, refine=True).path
-    assert path is not None
-    lower_bound(problem, length=path.length).check(problem)
+    lower_bound(problem, length=math.inf).check(problem)
 
 
 def _search_grid(surface: Surface) -> None:
@@ -130,9 +134,9 @@ KINDS: dict[str, Callable[[Surface], None]] = {
 def rehearsals() -> list[Rehearsal]:
     """All that `plan`, `field`, `check` and `reproduce` compile."""
     return [
-        Rehearsal(f"{kind} on {name}", partial(_rehearse, work, surface))
-        for kind, work in KINDS.items()
+        Rehearsal(rehearsal_name(kind, name), partial(_rehearse, work, surface))
         for name, surface in SURFACES.items()
+        for kind, work in KINDS.items()
     ]
 
 
@@ -142,30 +146,31 @@ def _rehearse(work: Callable[[Surface], None], surface: Callable[[], Surface]) -
 
 
 def _listed(directory: Path) -> list[str] | None:
-    """Files of these very kernels, if every one is still there."""
+    """Files of these very kernels, if every one is still there and sound."""
     try:
         record = json.loads((directory / LIST_FILE).read_text(encoding="utf-8"))
         names: list[str] = record["files"]
-        if record["key"] != compiler.cache_key():
+        if record["key"] != cache.environment():
             return None
-        return names if all((directory / name).is_file() for name in names) else None
+        sound = all(cache.read_sound(directory / name) is not None for name in names)
+        return names if sound else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
 def _write_list(directory: Path, names: list[str]) -> None:
-    record = {"key": compiler.cache_key(), "files": names}
+    record = {"key": cache.environment(), "files": names}
     with written_whole(directory / LIST_FILE) as temporary:
         temporary.write_text(json.dumps(record) + "\n", encoding="utf-8")
 
 
 def _warmth(directory: Path, names: list[str], compiled: int) -> Warmth:
     size = sum((directory / name).stat().st_size for name in names)
-    return Warmth(compiled, sum(name.endswith(".nbc") for name in names), size, directory)
+    return Warmth(compiled, len(names), size, directory)
 
 
 def warm_up(watch: Watch = watch_nothing) -> Warmth:
-    """Compile what is not in the cache yet.
+    """Compile what is not in the cache yet, or damaged.
 
     Raises InputError where kernels are not compiled at all, MapError where the cache cannot be
     written.
@@ -176,17 +181,36 @@ def warm_up(watch: Watch = watch_nothing) -> Warmth:
     names = _listed(directory)
     if names is not None:
         return _warmth(directory, names, 0)
-    compiled = _rehearse_all(rehearsals(), watch)
-    names = compiler.cached_files()
+    before = cache.kept_files()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", KernelWarning)  # which is the error below
+        _rehearse_all(rehearsals(), watch)
+    if (failure := cache.unkept()) is not None:
+        raise MapError(failure)
+    names = cache.kept_files()
     _write_list(directory, names)
-    return _warmth(directory, names, compiled)
+    return _warmth(directory, names, len(set(names) - set(before)))
 
 
-def _rehearse_all(work: list[Rehearsal], watch: Watch) -> int:
-    """How many kernels had to be compiled."""
-    before = compiler.cache_statistics()["compiled"]
-    for done, rehearsal in enumerate(work):
-        watch(rehearsal.name, done, len(work))
-        rehearsal.run()
+def _rehearse_all(work: list[Rehearsal], watch: Watch) -> None:
+    """The second half on a second core; here, it finds those kernels or compiles them."""
+    half = len(work) // 2
+    with SecondCore(*[rehearsal.name for rehearsal in work[half:]]) as second:
+        for done, rehearsal in enumerate(work):
+            if done == half:
+                second.wait()
+            watch(rehearsal.name, done, len(work))
+            rehearsal.run()
     watch("compiled", len(work), len(work))
-    return compiler.cache_statistics()["compiled"] - before
+
+
+def rehearse(names: list[str]) -> None:
+    """What the second process does."""
+    serve_first_core()
+    for rehearsal in rehearsals():
+        if rehearsal.name in names:
+            rehearsal.run()
+
+
+if __name__ == "__main__":
+    rehearse(sys.argv[1:])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, TerrapathWarning, collecting
-from ..planners.base import Callback, Progress
+from ..planners.base import Callback
 from .option import Point
 from .question import Itinerary, Question, asked
 from .scenario import Scenario
@@ -90,8 +91,8 @@ def answer(scenario: Scenario, *, watch: Callback | None = None) -> Answer:
     if outputs is not None:
         outputs.check(scenario.inputs())
     with collecting() as warnings, asked(scenario) as question:
-        run = _Run(planner, question, outputs, watch)
         cells = question.cells()
+        run = _Run(planner, question, outputs, watch)
         solution, goals = (
             run.in_corridor(cells) if is_planned_in_corridor(scenario, cells) else run.whole()
         )
@@ -215,19 +216,14 @@ class _Run:
         """Plan on all of the map: one route, or one to each goal that may be the nearest."""
         from ..planners.tours import nearest, plan_goals, plan_tour
 
-        itinerary, route = self._itinerary(), self.question.scenario.route
-        problem, watch = itinerary.problem, self._told(itinerary.problem)
-        if len(itinerary.goals) == 1:
-            return plan_tour(problem, self.planner, itinerary.via, callback=watch), ()
-        goals = plan_goals(
-            problem,
-            self.planner,
-            itinerary.goals,
-            itinerary.via,
-            every=route.all_goals,
-            callback=watch,
-        )
-        return nearest(goals), goals
+        itinerary = self._itinerary()
+        problem, via, goals = itinerary.problem, itinerary.via, itinerary.goals
+        with self._watched(problem) as watch:
+            if len(goals) == 1:
+                return plan_tour(problem, self.planner, via, callback=watch), ()
+            every = self.question.scenario.route.all_goals
+            found = plan_goals(problem, self.planner, goals, via, every=every, callback=watch)
+        return nearest(found), found
 
     def in_corridor(self, cells: int) -> tuple[Solution, tuple[GoalAnswer, ...]]:
         """Plan on the map read coarser, and on the map itself around the route found there."""
@@ -239,9 +235,10 @@ class _Run:
 
         width = self.question.scenario.planner.corridor
         half_width = width if isinstance(width, float) else None
-        solution = plan_in_corridor(
-            pose, self.planner, cells, half_width=half_width, callback=self.watch
-        )
+        with self._watched(None) as watch:
+            solution = plan_in_corridor(
+                pose, self.planner, cells, half_width=half_width, callback=watch
+            )
         return solution, ()
 
     def _itinerary(self, part: Part | None = None) -> Itinerary:
@@ -250,13 +247,24 @@ class _Run:
             self.outputs.require_fit(itinerary.problem)
         return itinerary
 
-    def _told(self, problem: Problem) -> Callback | None:
-        """The watcher, told the unit of what it sees."""
-        watch, unit = self.watch, problem.surface.unit
-        if watch is None:
-            return None
+    @contextmanager
+    def _watched(self, problem: Problem | None) -> Iterator[Callback | None]:
+        """The watcher, told the unit of what it sees; and kernels compiled on a second core.
 
-        def see(progress: Progress) -> bool | None:
-            return watch(progress._replace(unit=unit))
+        problem : None where it is made later, of a part of a map.
+        """
+        surface = None if problem is None else problem.surface
+        unit = "" if surface is None else surface.unit
+        watch = None if self.watch is None else _with_unit(self.watch, unit)
+        if not (self.planner.bound or self.planner.target_gap is not None):
+            yield watch
+            return
+        from ..planners.second_core import bound_compiled_beside
 
-        return see
+        kind = "spline" if surface is None else type(surface.data).__name__.lower()
+        with bound_compiled_beside(kind, watch) as joined:
+            yield joined
+
+
+def _with_unit(watch: Callback, unit: str) -> Callback:
+    return lambda progress: watch(progress._replace(unit=unit))

@@ -1,0 +1,129 @@
+"""A second process that compiles kernels while this one compiles others.
+
+Numba compiles on one core. So what is needed later is rehearsed beside what is needed now, and
+both keep their kernels in the same cache. Whatever becomes of the second process, this one
+compiles what it does not find: it may lose time, never an answer.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import TracebackType
+from typing import Self
+
+from .._kernels import cache
+from .base import PROVING, Callback, Progress
+
+# Seconds that are waited for a process that does not end by itself.
+PATIENCE = 120.0
+
+
+def rehearsal_name(work: str, surface_class: str) -> str:
+    """What `warmup` calls some work on a class of surface."""
+    return f"{work} on {surface_class}"
+
+
+def cores() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class SecondCore:
+    """Rehearsals by their names in `warmup`, in a process that starts with the first compilation.
+
+    That is while the context lasts and until ``wait``, and only where there are two cores.
+    So nothing is started where all kernels are in the cache.
+    """
+
+    def __init__(self, *rehearsals: str) -> None:
+        self.rehearsals = rehearsals
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Self:
+        cache.listeners.append(self.start)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        place: TracebackType | None,
+    ) -> None:
+        self._start_no_more()
+        self._end()
+
+    def start(self, kernel: str = "") -> None:
+        """Start the process, if that helps; ``kernel`` is what is about to be compiled here."""
+        self._start_no_more()
+        if not self.rehearsals or not sys.executable or cores() < 2:
+            return
+        # Without the working directory among the places to import from. Its standard input ends
+        # when this process does, however it does.
+        command = [sys.executable, "-P", "-m", f"{__package__}.warmup", *self.rehearsals]
+        nowhere = subprocess.DEVNULL
+        with suppress(OSError):
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=nowhere, stderr=nowhere
+            )
+
+    def wait(self) -> None:
+        """Until the kernels are there, or will not be."""
+        self._start_no_more()
+        if self.process is not None:
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(PATIENCE)
+        self._end()
+
+    def _start_no_more(self) -> None:
+        with suppress(ValueError):
+            cache.listeners.remove(self.start)
+
+    def _end(self) -> None:
+        """End the process, if it still runs, and forget it."""
+        process, self.process = self.process, None
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        if process.stdin is not None:
+            process.stdin.close()
+
+
+@contextmanager
+def bound_compiled_beside(surface_class: str, callback: Callback | None) -> Iterator[Callback]:
+    """Compile what proves the bound on a second core, while the planner's kernels are compiled.
+
+    surface_class : "peaks" or "spline". callback : a planner's; what is given stands for it, and
+    waits for the second core when the bound is begun.
+    """
+    with SecondCore(rehearsal_name("lower bounds", surface_class)) as second:
+
+        def watch(progress: Progress) -> bool:
+            if progress.stage == PROVING:
+                second.wait()
+            return callback is not None and bool(callback(progress))
+
+        yield watch
+
+
+def serve_first_core() -> None:
+    """Be the second process: end with the first, and at once where no kernel can be kept."""
+    threading.Thread(target=_end_with_the_first, daemon=True).start()
+    cache.listeners.append(_require_keeping)
+
+
+def _end_with_the_first() -> None:
+    os.read(sys.__stdin__.fileno() if sys.__stdin__ else 0, 1)
+    os._exit(1)
+
+
+def _require_keeping(kernel: str) -> None:
+    if cache.unkept() is not None:
+        sys.exit(1)
