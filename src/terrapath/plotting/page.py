@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 from matplotlib.colors import to_hex
-from scipy.ndimage import map_coordinates
 
 from ..errors import MapError
 from ..files import written_whole
@@ -67,10 +66,7 @@ class Stage(NamedTuple):
 
     def drawn(self, points: Array, lifts: float = 1.0) -> dict[str, Array]:
         """x, y, z of lines over the terrain: never under its mesh, which is coarser."""
-        terrain = self.terrain
-        column = (points[:, 0] - terrain.x[0]) / (terrain.x[1] - terrain.x[0])
-        row = (points[:, 1] - terrain.y[0]) / (terrain.y[1] - terrain.y[0])
-        mesh = map_coordinates(terrain.values[0], [row, column], order=1, mode="nearest")
+        mesh = self.terrain.drawn_heights(*points.T)
         heights = self.solution.problem.surface.values(points)[:, 0]
         x, y = (points - self.origin).T
         return {"x": x, "y": y, "z": np.maximum(mesh, heights) + lifts * self.lift}
