@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import rasterio
 import xarray
-from affine import Affine
 from pyproj import CRS, Transformer
+from rasterio import Affine
 from scipy.ndimage import binary_dilation, binary_erosion
 
 import terrapath as tp

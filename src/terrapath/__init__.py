@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         FitError,
         InputError,
         MapError,
+        MissingExtraError,
         OutsideSurfaceError,
         TerrapathError,
     )
@@ -65,6 +66,7 @@ _HOMES = {
     "FitError": "errors",
     "InputError": "errors",
     "MapError": "errors",
+    "MissingExtraError": "errors",
     "OutsideSurfaceError": "errors",
     "TerrapathError": "errors",
     "Circle": "free_space",
@@ -122,6 +124,7 @@ __all__ = [
     "LayerSource",
     "MapError",
     "Mask",
+    "MissingExtraError",
     "Optimal",
     "OutsideSurfaceError",
     "Path",

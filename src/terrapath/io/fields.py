@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from affine import Affine
+from rasterio import Affine
 
 from .. import __version__
 from ..eikonal import DistanceField

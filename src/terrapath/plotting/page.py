@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from matplotlib.colors import to_hex
 
+from .._support.extras import require_packages
 from ..errors import MapError
 from ..files import written_whole
 from ..free_space import sort_obstacles
@@ -335,6 +336,7 @@ def _layout(stage: Stage) -> dict[str, Any]:
 
 def draw_page(solution: Solution) -> Any:
     """A plotly figure of terrain, obstacles, route and ends."""
+    require_packages("a page", "plotly")
     import plotly.graph_objects as go
 
     stage = Stage.of(solution)
@@ -343,9 +345,10 @@ def draw_page(solution: Solution) -> Any:
 
 
 def require_known_page(path: Path) -> None:
-    """Raise MapError for an ending that is no page's."""
+    """Raise MapError for an ending that is no page's, MissingExtraError without plotly."""
     if path.suffix.lower() != ENDING:
         raise MapError(f"page={str(path)!r} has no known format; end it in {ENDING}")
+    require_packages(f"page={str(path)!r}", "plotly")
 
 
 def plot_page(solution: Solution, path: str | Path) -> None:

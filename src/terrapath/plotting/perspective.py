@@ -33,15 +33,18 @@ class Ground(QuadMesh):
 
     def __init__(self, terrain: Terrain, colours: Array, **style: Any) -> None:
         x, y = np.meshgrid(terrain.x, terrain.y)
-        from_far = np.array([x, y, terrain.values[0]])[:, ::-1, ::-1]
-        self._corners = from_far.reshape(3, -1)  # x1, x2, height
-        super().__init__(np.moveaxis(from_far[:2], 0, -1), **style)
-        self.set_facecolor(colours[:-1, :-1][::-1, ::-1].reshape(-1, 3))
+        # x1, x2 and height of the corners (ny, nx), the viewer at the low end of both axes.
+        self._corners = np.array([x, y, terrain.values[0]])[:, ::-1, ::-1]
+        facecolors = colours[:-1, :-1][::-1, ::-1].reshape(-1, 3)
+        super().__init__(np.moveaxis(self._corners[:2], 0, -1), facecolors=facecolors, **style)
 
     def do_3d_projection(self) -> float:
         """Where the corners are in the picture, as the axes ask before they draw."""
-        seen_x, seen_y, depth = proj3d.proj_transform(*self._corners, self.axes.get_proj())
-        self._coordinates = np.stack([seen_x, seen_y], axis=-1).reshape(self._coordinates.shape)
+        axes: Any = self.axes
+        flat = self._corners.reshape(3, -1)
+        seen_x, seen_y, depth = proj3d.proj_transform(*flat, axes.get_proj())
+        shape = (*self._corners.shape[1:], 2)
+        self._coordinates: Array = np.stack([seen_x, seen_y], axis=-1).reshape(shape)
         return float(depth.min())
 
 

@@ -85,7 +85,7 @@ def _fill_from_coarser(values: Array, known: Cells) -> None:
     _fill_from_coarser(coarse, coarse_known)
     for rows in blocks(*known.shape):
         row, column = np.nonzero(~known[rows])
-        at_row, at_column = (row + rows.start) * 0.5 - 0.25, column * 0.5 - 0.25
+        at_row, at_column = np.stack([row + rows.start, column]) * 0.5 - 0.25
         values[rows][row, column] = bilinear(coarse, at_row, at_column)
 
 
