@@ -7,13 +7,14 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
+PLACES = [str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])]
 
 
 def in_another_process(code, **environment):
     """What a program that may import the tests prints, as JSON."""
     done = subprocess.run(
         [sys.executable, "-c", code],
-        env={**os.environ, "PYTHONPATH": str(HERE), **environment},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(PLACES), **environment},
         cwd=HERE,
         capture_output=True,
         text=True,

@@ -31,12 +31,13 @@ class Ground(QuadMesh):
     nothing is sorted, and matplotlib draws the mesh in one call.
     """
 
-    def __init__(self, terrain: Terrain, colours: Array, **style: Any) -> None:
+    def __init__(self, terrain: Terrain, colours: Array) -> None:
         x, y = np.meshgrid(terrain.x, terrain.y)
         # x1, x2 and height of the corners (ny, nx), the viewer at the low end of both axes.
         self._corners = np.array([x, y, terrain.values[0]])[:, ::-1, ::-1]
         facecolors = colours[:-1, :-1][::-1, ::-1].reshape(-1, 3)
-        super().__init__(np.moveaxis(self._corners[:2], 0, -1), facecolors=facecolors, **style)
+        style: dict[str, Any] = {"facecolors": facecolors, "antialiased": False, "zorder": 1}
+        super().__init__(np.moveaxis(self._corners[:2], 0, -1), **style)
 
     def do_3d_projection(self) -> float:
         """Where the corners are in the picture, as the axes ask before they draw."""
@@ -105,7 +106,7 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     _tint(colours, terrain.solid, OBSTACLE_COLOUR)
     axes.set_proj_type("ortho")
     axes.computed_zorder = False
-    axes.add_collection(Ground(terrain, colours, antialiased=False, zorder=1), autolim=False)
+    axes.add_collection(Ground(terrain, colours), autolim=False)
     bounds = problem.bounds
     longer = max(bounds.width, bounds.height)
     box = np.array([bounds.width / longer, bounds.height / longer, RELIEF])
