@@ -34,9 +34,9 @@ def _is_finite(array: NDArray[Any]) -> bool:
     return array.dtype.kind in "fiu" and bool(np.isfinite(array).all())
 
 
-def dump(record: Any, indent: int | None = None) -> str:
+def dump(record: Any) -> str:
     """Strict JSON; letters that no encoding can hold stay escaped."""
-    return json.dumps(plain(record), allow_nan=False, indent=indent) + "\n"
+    return json.dumps(plain(record), allow_nan=False) + "\n"
 
 
 def provenance(solution: Solution) -> dict[str, Any]:
