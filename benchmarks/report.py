@@ -103,8 +103,8 @@ def marching_lines(data: MarchData) -> list[str]:
     header += ["ratio", "error at the goal", "error of HFM", "bytes a node", "GB in all"]
     return [
         "The distance field of h from the start, second order, in seconds; dependents are the "
-        "lists of which nodes read which. Each lattice has a process of its own, warm. Memory is the "
-        "process's peak, and for a node what that is above the peak before.",
+        "lists of which nodes depend on which. Each lattice has a process of its own, warm. Memory "
+        "is the process's peak, and for a node what that is above the peak before.",
         "",
         peer,
         "",

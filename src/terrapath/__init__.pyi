@@ -18,6 +18,9 @@ from .errors import (
     MapError as MapError,
 )
 from .errors import (
+    MissingExtraError as MissingExtraError,
+)
+from .errors import (
     OutsideSurfaceError as OutsideSurfaceError,
 )
 from .errors import (

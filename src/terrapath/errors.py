@@ -30,6 +30,10 @@ class MapError(TerrapathError):
     """A file that cannot be read as a map, or written."""
 
 
+class MissingExtraError(TerrapathError, ImportError):
+    """A package that not every installation has. The message names the command to install it."""
+
+
 class CertificateError(TerrapathError):
     """A certificate that does not prove what it claims."""
 

@@ -12,6 +12,7 @@ from numba import config
 from kernel_copies import copy_machinery
 from processes import in_another_process
 from terrapath._kernels import cache, compiler
+from terrapath._support.extras import EXTRA_OF
 from terrapath.cli import console
 from terrapath.cli.main import run
 from terrapath.errors import InputError
@@ -269,6 +270,13 @@ FOR_SOME = {
 def test_help_imports_nothing_heavy():
     modules = modules_of("--help")
     assert not modules & (FOR_SOME | {"numpy", "numba", "scipy", "shapely", "pydantic"})
+
+
+def test_a_route_and_its_picture_take_no_extra_and_little_of_scipy(tmp_path):
+    outputs = ("--output", str(tmp_path / "route.geojson"), "--plot", str(tmp_path / "route.png"))
+    modules = modules_of("plan", "jacksboro", "--samples", "500", "--no-bound", *outputs)
+    assert {"matplotlib", "pyproj", "rasterio"} <= modules
+    assert not modules & (EXTRA_OF.keys() | {f"scipy.{part}" for part in ("optimize", "stats")})
 
 
 def test_a_plan_on_a_scene_imports_what_it_needs():

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import rasterio
 import xarray
-from affine import Affine
+from rasterio import Affine
 
 import terrapath as tp
 

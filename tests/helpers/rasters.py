@@ -2,7 +2,7 @@
 
 import numpy as np
 import rasterio
-from affine import Affine
+from rasterio import Affine
 
 UTM = "EPSG:32633"
 NORTH_UP = Affine(10.0, 0.0, 500_000.0, 0.0, -10.0, 4_000_120.0)

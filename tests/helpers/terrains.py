@@ -2,8 +2,8 @@
 
 import numpy as np
 import xarray
-from affine import Affine
 from pyproj import CRS, Transformer
+from rasterio import Affine
 
 from rasters import centres
 

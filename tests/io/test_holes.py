@@ -5,7 +5,7 @@ import inspect
 import numpy as np
 import pytest
 import rasterio
-from affine import Affine
+from rasterio import Affine
 from scipy.ndimage import binary_erosion
 
 import terrapath as tp

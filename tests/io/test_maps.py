@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import rasterio
 import xarray
-from affine import Affine
 from pyproj import CRS, Transformer
+from rasterio import Affine
 
 import terrapath as tp
 from common import REAL_MAPS, one_line
@@ -363,3 +363,13 @@ def test_jacksboro_as_a_geotiff_is_the_built_in_scene(tmp_path):
     assert surface.bounds == scene.bounds
     assert surface.fit.smoothing is None  # whole metres on cells of 80 m need none
     np.testing.assert_array_equal(surface.data.coefficients, scene.data.coefficients)
+
+
+def test_the_plane_is_named_by_its_code_or_as_it_was_made(tmp_path):
+    degrees = Affine(0.001, 0.0, 15.0, 0.0, -0.001, 46.0), WGS84.to_wkt()
+    local = tp.read_surface(write(tmp_path / "degrees.tif", HEIGHTS, *degrees)).georeference
+    assert not local.is_map_crs
+    assert local.text == local.crs.to_string()
+    assert CRS(local.text) == local.crs
+    projected = tp.read_surface(write(tmp_path / "metres.tif", HEIGHTS)).georeference
+    assert projected.text == UTM

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import rasterio
 import rasterio.crs
-from affine import Affine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import CRS, Geod, Transformer
+from rasterio import Affine
 
 import terrapath as tp
 from common import REAL_MAPS, one_line

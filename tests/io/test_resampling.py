@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 import rasterio
-from affine import Affine
 from pyproj import CRS, Transformer
+from rasterio import Affine
 from scipy.ndimage import binary_dilation
 
 import terrapath as tp

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 import terrapath as tp
 from terrapath._support.files import folder_written_whole, require_writable
-from terrapath.io.routes import WRITERS, require_fitting_format, require_known_format
+from terrapath.io.routes import WRITERS, require_fitting_format
 from terrapath.io.routes.places import parts_in_degrees
 from terrapath.io.routes.profile import distinct, headings, slopes
 from terrapath.surface.georeference import Georeference, local_projection
@@ -441,12 +441,6 @@ def test_a_bag_whose_place_is_taken_at_the_last_moment_comes_back(tmp_path, monk
     with pytest.raises(tp.MapError, match="Permission denied"):
         replaced()
     assert files_of(target) == before
-
-
-def test_a_missing_library_is_told_before_planning(monkeypatch, tmp_path):
-    monkeypatch.setattr("terrapath.io.routes.ros.find_spec", lambda _: None)
-    with pytest.raises(tp.MapError, match=r"pip install 'terrapath\[ros\]'"):
-        require_known_format(tmp_path / "route.bag2")
 
 
 # Slopes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import rasterio
 import shapely
-from affine import Affine
+from rasterio import Affine
 
 import terrapath as tp
 from terrapath.cli.main import run

@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.contour import QuadContourSet
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import terrapath as tp
@@ -25,7 +27,13 @@ from terrapath.plotting import (
     plot_route,
 )
 from terrapath.plotting.map_view import PATH_COLOUR
-from terrapath.plotting.perspective import _is_hidden, _view_direction
+from terrapath.plotting.perspective import (
+    AZIMUTH,
+    ELEVATION,
+    Ground,
+    _is_hidden,
+    _view_direction,
+)
 from terrapath.plotting.terrain import Terrain
 
 
@@ -170,6 +178,42 @@ def test_points_behind_a_hill_are_hidden_and_points_before_it_are_not():
     assert towards[1] < 0  # the viewer stands to the south
     ground = np.array([[5.6, 6.5, 0.2], [4.4, 2.0, 0.1], [9.0, 9.0, 0.01]])
     assert _is_hidden(terrain, ground, towards, 0.02).tolist() == [True, False, False]
+
+
+def painted(draw):
+    """What is drawn onto 3-D axes that show nothing else, as pixels."""
+    figure = Figure(figsize=(4, 4), dpi=100)
+    axes = figure.add_subplot(projection="3d", computed_zorder=False)
+    draw(axes)
+    axes.set_proj_type("ortho")
+    axes.set_axis_off()
+    axes.set(xlim=(-1, 11), ylim=(-1, 11), zlim=(0, 6))
+    axes.view_init(elev=ELEVATION, azim=AZIMUTH)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+
+
+def test_the_ground_in_3d_is_painted_as_matplotlib_paints_a_surface():
+    terrain = Terrain.sample(tp.scenes.load("six-peaks"), 60)
+    colours = terrain.shaded(0)
+    x, y = np.meshgrid(terrain.x, terrain.y)
+    style = {"rcount": 60, "ccount": 60, "shade": False, "antialiased": False, "linewidth": 0}
+    theirs = painted(
+        lambda axes: axes.plot_surface(x, y, terrain.values[0], facecolors=colours, **style)
+    )
+    ground = (theirs < 250).any(axis=-1)
+    assert ground.mean() > 0.15
+
+    def differing(terrain, colours):
+        ours = painted(lambda axes: axes.add_collection(Ground(terrain, colours)))
+        assert ((ours < 250).any(axis=-1) == ground).mean() > 0.99
+        return (np.abs(ours - theirs).max(axis=-1) > 40)[ground].mean()
+
+    # Hills hide what is behind them; painted from near to far, they would not.
+    mirrored = replace(terrain, x=terrain.x[::-1], values=terrain.values[..., ::-1])
+    assert differing(terrain, colours) < 0.01
+    assert differing(mirrored, colours[:, ::-1]) > 0.03
 
 
 def test_a_failed_drawing_leaves_no_file(solution, tmp_path):

@@ -46,7 +46,11 @@ def plain(answer):
 CASES = {
     "a scene": ("six-peaks", {}, []),
     "a map": ("dem.tif", {"weights": {"height": 4}}, ["--weight", "height=4"]),
-    "constraints": ("dem.tif", {"radius": 5, "max_slope": 30}, ["--radius", "5", "--max-slope", "30"]),
+    "constraints": (
+        "dem.tif",
+        {"radius": 5, "max_slope": 30},
+        ["--radius", "5", "--max-slope", "30"],
+    ),
     "a tour": ("dem.tif", {"via": [(500_300.0, 4_000_050.0)]}, ["--via", "500300,4000050"]),
     "another planner": (
         "dem.tif",
@@ -95,7 +99,7 @@ def test_a_large_map_is_planned_on_in_a_corridor(dem, monkeypatch):
 
 
 def test_degrees_are_answered_in_python_too(tmp_path):
-    y, x = np.mgrid[0:30, 0:30]
+    x = np.mgrid[0:30, 0:30][1]
     path = write(
         tmp_path / "degrees.tif", 5.0 * np.sin(x / 6.0), from_origin(11.0, 47.0, 0.001, 0.001), 4326
     )

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from affine import Affine
 from pyproj import CRS
 from pyproj.exceptions import CRSError
+from rasterio import Affine
 
 from ..errors import InputError, MapError
 from ..surface.georeference import parse_crs

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from affine import Affine
+from rasterio import Affine
 
 from .. import __version__
 from .._support.files import written_whole

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from affine import Affine
 from pyproj import CRS
+from rasterio import Affine
 
+from .._support.extras import require_packages
 from ..errors import MapError, TerrapathError
 from ..surface.georeference import parse_crs
 from ..surface.grid import Grid
@@ -180,6 +181,7 @@ def classic_netcdf(path: str | Path) -> tuple[Path, str | None] | None:
 
 def open_classic_netcdf(path: Path, files: Any) -> Any:
     """The file as an xarray Dataset, read by SciPy; closed with the stack ``files``."""
+    require_packages(f"{path}, netCDF of the classic format,", "xarray")
     import xarray
 
     with reading(path):

@@ -12,7 +12,6 @@ from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.patches import Circle as Disc
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
-from scipy.ndimage import gaussian_filter
 from shapely import LineString, Point, Polygon
 
 from ..problem import Problem, Solution
@@ -119,6 +118,8 @@ def _draw_contours(axes: Any, terrain: Terrain) -> None:
         style = {"colors": "black", "linewidths": 0.45, "alpha": 0.45, "linestyles": "solid"}
         axes.contour(terrain.x, terrain.y, heights, CONTOURS, **style)
     if others and np.ptp(others[0]) > 0.0:
+        from scipy.ndimage import gaussian_filter
+
         style = {"cmap": LAYER_COLOURS, "linewidths": 0.8, "alpha": 0.9}
         smooth = gaussian_filter(others[0], LAYER_SMOOTHING)
         axes.contour(terrain.x, terrain.y, smooth, LAYER_CONTOURS, **style)

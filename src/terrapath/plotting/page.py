@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 from matplotlib.colors import to_hex
-from scipy.ndimage import map_coordinates
 
+from .._support.extras import require_packages
 from .._support.files import written_whole
 from ..errors import MapError
 from ..io.routes.profile import clean, slopes
@@ -67,10 +67,7 @@ class Stage(NamedTuple):
 
     def drawn(self, points: Array, lifts: float = 1.0) -> dict[str, Array]:
         """x, y, z of lines over the terrain: never under its mesh, which is coarser."""
-        terrain = self.terrain
-        column = (points[:, 0] - terrain.x[0]) / (terrain.x[1] - terrain.x[0])
-        row = (points[:, 1] - terrain.y[0]) / (terrain.y[1] - terrain.y[0])
-        mesh = map_coordinates(terrain.values[0], [row, column], order=1, mode="nearest")
+        mesh = self.terrain.drawn_heights(*points.T)
         heights = self.solution.problem.surface.values(points)[:, 0]
         x, y = (points - self.origin).T
         return {"x": x, "y": y, "z": np.maximum(mesh, heights) + lifts * self.lift}
@@ -339,6 +336,7 @@ def _layout(stage: Stage) -> dict[str, Any]:
 
 def draw_page(solution: Solution) -> Any:
     """A plotly figure of terrain, obstacles, route and ends."""
+    require_packages("a page", "plotly")
     import plotly.graph_objects as go
 
     stage = Stage.of(solution)
@@ -347,9 +345,10 @@ def draw_page(solution: Solution) -> Any:
 
 
 def require_known_page(path: Path) -> None:
-    """Raise MapError for an ending that is no page's."""
+    """Raise MapError for an ending that is no page's, MissingExtraError without plotly."""
     if path.suffix.lower() != ENDING:
         raise MapError(f"page={str(path)!r} has no known format; end it in {ENDING}")
+    require_packages(f"page={str(path)!r}", "plotly")
 
 
 def plot_page(solution: Solution, path: str | Path) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
-from scipy.ndimage import map_coordinates
+from matplotlib.collections import QuadMesh
+from mpl_toolkits.mplot3d import proj3d
 
 from ..problem import Solution
 from ..validation import Array
@@ -21,6 +22,31 @@ ELEVATION, AZIMUTH = 42.0, -115.0  # degrees: where the viewer stands
 RELIEF = 0.26  # height of the drawn box, as a share of its longer side
 SIGHT_STEPS = 240
 PATH_POINTS = 1500
+
+
+class Ground(QuadMesh):
+    """Quadrilaterals of a height map in a 3-D view, painted from the farthest to the nearest.
+
+    Rows and columns of a height map, taken from the far corner on, are in that order already:
+    nothing is sorted, and matplotlib draws the mesh in one call.
+    """
+
+    def __init__(self, terrain: Terrain, colours: Array) -> None:
+        x, y = np.meshgrid(terrain.x, terrain.y)
+        # x1, x2 and height of the corners (ny, nx), the viewer at the low end of both axes.
+        self._corners = np.array([x, y, terrain.values[0]])[:, ::-1, ::-1]
+        facecolors = colours[:-1, :-1][::-1, ::-1].reshape(-1, 3)
+        style: dict[str, Any] = {"facecolors": facecolors, "antialiased": False, "zorder": 1}
+        super().__init__(np.moveaxis(self._corners[:2], 0, -1), **style)
+
+    def do_3d_projection(self) -> float:
+        """Where the corners are in the picture, as the axes ask before they draw."""
+        axes: Any = self.axes
+        flat = self._corners.reshape(3, -1)
+        seen_x, seen_y, depth = proj3d.proj_transform(*flat, axes.get_proj())
+        shape = (*self._corners.shape[1:], 2)
+        self._coordinates: Array = np.stack([seen_x, seen_y], axis=-1).reshape(shape)
+        return float(depth.min())
 
 
 def _view_direction(box: Array, spread: Array) -> Array:
@@ -43,12 +69,9 @@ def _is_hidden(
     reach = (terrain.values[0].max() - lifted[:, 2].min()) / towards[2]
     steps = np.linspace(0.0, reach, SIGHT_STEPS)[1:, None, None]
     sight = lifted + steps * towards
-    column = (sight[..., 0] - terrain.x[0]) / (terrain.x[1] - terrain.x[0])
-    row = (sight[..., 1] - terrain.y[0]) / (terrain.y[1] - terrain.y[0])
-    ground = map_coordinates(
-        terrain.values[0], [row, column], order=1, mode="constant", cval=-np.inf
-    )
-    return np.asarray((ground > sight[..., 2] + lift).any(axis=0))
+    over_ground = terrain.problem.bounds.contains(sight[..., :2])
+    behind = terrain.drawn_heights(sight[..., 0], sight[..., 1]) > sight[..., 2] + lift
+    return np.asarray((over_ground & behind).any(axis=0))
 
 
 def _draw_path(axes: Any, solution: Solution, terrain: Terrain, box: Array, spread: Array) -> None:
@@ -77,25 +100,13 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     problem = solution.problem
     terrain = Terrain.sample(problem, SAMPLES)
     layer = 1 if len(terrain.values) > 1 else 0
-    grid_x, grid_y = np.meshgrid(terrain.x, terrain.y)
     colours = terrain.shaded(layer)
     _tint(colours, terrain.blocked, MARGIN_COLOUR)
     _tint(colours, terrain.steep, STEEP_COLOUR)
     _tint(colours, terrain.solid, OBSTACLE_COLOUR)
     axes.set_proj_type("ortho")
     axes.computed_zorder = False
-    axes.plot_surface(
-        grid_x,
-        grid_y,
-        terrain.values[0],
-        facecolors=colours,
-        rcount=len(terrain.y),
-        ccount=len(terrain.x),
-        linewidth=0,
-        antialiased=False,
-        shade=False,
-        zorder=1,
-    )
+    axes.add_collection(Ground(terrain, colours), autolim=False)
     bounds = problem.bounds
     longer = max(bounds.width, bounds.height)
     box = np.array([bounds.width / longer, bounds.height / longer, RELIEF])

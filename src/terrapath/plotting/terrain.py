@@ -16,6 +16,7 @@ from matplotlib.colors import LightSource, Normalize
 from ..problem import Problem
 from ..space.free_space import Circle, sort_obstacles
 from ..surface import Mask
+from ..surface.neighbours import bilinear
 from ..validation import Array
 from .labels import with_unit
 
@@ -48,6 +49,12 @@ class Terrain:
         y = np.linspace(bounds.x2_min, bounds.x2_max, rows)
         points = np.stack(np.meshgrid(x, y), axis=-1)
         return cls(problem, x, y, np.moveaxis(problem.surface.values(points), -1, 0))
+
+    def drawn_heights(self, x: Array, y: Array) -> Array:
+        """Heights of the ground as it is drawn, bilinear between the samples; map units."""
+        column = (x - self.x[0]) / (self.x[1] - self.x[0])
+        row = (y - self.y[0]) / (self.y[1] - self.y[0])
+        return bilinear(self.values[0], row, column)
 
     @cached_property
     def blocked(self) -> Cells:

@@ -48,6 +48,8 @@ def separated(
     space : all obstacles, for segments to be tested against. masks : theirs. walls : lines,
     each of which lies wholly in one of the other obstacles.
     """
+    if _are_free(space, np.array([a]), np.array([b])).all():
+        return False
     windows = [_Window.of(mask, bounds) for mask in merged_masks(masks)]
     if any(window.separates(a, b) for window in windows):
         return True

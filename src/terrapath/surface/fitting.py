@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from .._kernels.surface.surfaces import Spline, fill_jets, fill_values
+from .._kernels.surface.tridiagonal import solve_curvatures
 from ..errors import FitError, InputError
 from ..validation import Array
 from .blocks import blocks
@@ -51,29 +53,31 @@ class FunctionFit(NamedTuple):
     smoothing: Smoothing | None = None
 
 
+@lru_cache(maxsize=16)
+def _factors(count: int) -> tuple[Array, Array]:
+    """D and the lower diagonal of L, where L D L^T has 4 on its diagonal and 1 beside it."""
+    pivots = np.full(count, 4.0)
+    for j in range(1, count):
+        pivots[j] -= 1.0 / pivots[j - 1]
+    return pivots, 1.0 / pivots
+
+
 def _curvatures(f: Array) -> Array:
     """Second derivatives h^2 f'' (n, m) of the interpolating splines through columns f (n, m).
 
     At inner knots m_(j-1) + 4 m_j + m_(j+1) = 6 (f_(j-1) - 2 f_j + f_(j+1)). With not-a-knot
     ends m_0 = 2 m_1 - m_2, which makes m_1 the second difference itself, and so at the end.
     """
-    from scipy.linalg import solveh_banded
-
     m = np.empty(f.shape, order="F")
     inner = m[1:-1]
     np.subtract(f[2:], f[1:-1], out=inner)
     inner -= f[1:-1]
     inner += f[:-2]
-    right = 6.0 * m[2:-2]
-    if len(right) > 0:
+    if len(right := m[2:-2]) > 0:
+        right *= 6.0
         right[0] -= m[1]
         right[-1] -= m[-2]
-    if len(right) == 1:  # SciPy's solver takes two and more
-        m[2] = 0.25 * right[0]
-    elif len(right) > 1:
-        bands = np.ones((2, len(right)))
-        bands[1] = 4.0
-        m[2:-2] = solveh_banded(bands, right, overwrite_b=True, check_finite=False)
+        solve_curvatures(m.T, *_factors(len(right)))
     m[0], m[-1] = 2.0 * m[1] - m[2], 2.0 * m[-2] - m[-3]
     return m
 

@@ -163,17 +163,24 @@ class Georeference:
         return f"{self.crs.name} on {self.map_crs.name}"
 
     @cached_property
-    def _to_map(self) -> Transformer:
-        from pyproj import Transformer
+    def text(self) -> str:
+        """The plane's CRS, for programs: its code where it has one, else as it was made.
 
-        return Transformer.from_crs(self.crs, self.map_crs, always_xy=True)
+        A local projection has none, and to look for it takes longer than to plan a route.
+        """
+        return str(self.crs.to_string() if self.is_map_crs else self.crs.srs)
+
+    @property
+    def _to_map(self) -> Transformer:
+        return transformer(self.crs, self.map_crs)
 
     @cached_property
     def _to_lonlat(self) -> Transformer:
-        from pyproj import CRS, Transformer
+        from pyproj import CRS
 
-        target = CRS.from_epsg(4326) if self.is_earth else self.crs.geodetic_crs
-        return Transformer.from_crs(self.crs, target, always_xy=True)
+        return transformer(
+            self.crs, CRS.from_epsg(4326) if self.is_earth else self.crs.geodetic_crs
+        )
 
     def to_map(self, points: Array) -> Array:
         """Plane (..., 2) -> the map's own coordinates, x (longitude) before y (latitude)."""

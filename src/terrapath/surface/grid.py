@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from affine import Affine
 from pyproj import CRS
+from rasterio import Affine
 
 from ..errors import MapError
 from ..validation import Array

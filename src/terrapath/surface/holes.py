@@ -6,20 +6,17 @@ from itertools import product
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation, find_objects, label, map_coordinates
-from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import spsolve
 
 from ..errors import MapError
 from ..validation import Array
 from .blocks import blocks
+from .neighbours import bilinear, grown
 
 Cells = npt.NDArray[np.bool_]
 
 RINGS = 8  # cells that the slope at a hole's edge is carried on for
 DAMPING = 0.8  # of the slope, from ring to ring: the ground levels off
 LARGEST_HOLE = 250_000  # cells of one hole that is filled: a sparse system of that size
-AROUND = np.ones((3, 3), dtype=bool)
 
 
 def missing_cells(values: Array) -> Cells:
@@ -39,7 +36,7 @@ def _carry_on(values: Array, known: Cells, damping: float) -> Cells:
     From each known neighbour n with a known m behind it: f(n) + damping (f(n) - f(m)).
     On a plane, with no damping, that is exact.
     """
-    ring: Cells = binary_dilation(known, AROUND) & ~known
+    ring: Cells = grown(known) & ~known
     row, column = np.nonzero(ring)
     sums, weights = np.zeros((2, len(row))), np.zeros((2, len(row)))
     for dy, dx in product((-1, 0, 1), repeat=2):
@@ -88,8 +85,8 @@ def _fill_from_coarser(values: Array, known: Cells) -> None:
     _fill_from_coarser(coarse, coarse_known)
     for rows in blocks(*known.shape):
         row, column = np.nonzero(~known[rows])
-        places = np.stack([row + rows.start, column]) * 0.5 - 0.25
-        values[rows][row, column] = map_coordinates(coarse, places, order=1, mode="nearest")
+        at_row, at_column = np.stack([row + rows.start, column]) * 0.5 - 0.25
+        values[rows][row, column] = bilinear(coarse, at_row, at_column)
 
 
 def continue_into_holes(values: Array, missing: Cells) -> None:
@@ -116,7 +113,9 @@ def _small_holes(missing: Cells, dx: float, dy: float, size: float) -> Cells:
 
     Cells that touch at a corner make one hole. What reaches the map's edge is no hole.
     """
-    labels, _ = label(missing, AROUND)
+    from scipy.ndimage import find_objects, label
+
+    labels, _ = label(missing, np.ones((3, 3)))
     chosen = np.zeros_like(missing)
     for number, (rows, columns) in enumerate(find_objects(labels), start=1):
         height, width = rows.stop - rows.start, columns.stop - columns.start
@@ -179,6 +178,9 @@ def fill_small_holes(values: Array, missing: Cells, dx: float, dy: float, size: 
     The plate bends least of all that carry on the ground around it: a plane stays a plane.
     Raises MapError where a hole has too many cells.
     """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.linalg import spsolve
+
     holes = _small_holes(missing, dx, dy, size)
     if not holes.any():
         return

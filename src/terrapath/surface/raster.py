@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from affine import Affine
 from pyproj import CRS
+from rasterio import Affine
 
 from ..errors import InputError, MapError
 from ..validation import Array

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from .._kernels.surface.surfaces import Spline, fill_values
 from ..errors import MapError
@@ -13,6 +12,7 @@ from .fitting import interpolate
 from .georeference import transformer
 from .grid import SAME_PLACE, Grid
 from .holes import continue_into_holes, missing_cells
+from .neighbours import bilinear
 
 LEAST_FOR_SPLINE = 4  # cells a side
 
@@ -76,7 +76,7 @@ def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: b
             np.clip(np.rint(c).astype(int), 0, m) for c, m in zip((row, column), last, strict=True)
         ]
         if spline is None:
-            found = map_coordinates(values, [row, column], order=1, mode="nearest")
+            found = bilinear(values, row, column)
         else:
             found = _spline_at(spline, column, row, (values.shape[0], values.shape[1]))
         found[missing[nearest[0], nearest[1]]] = np.nan

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .._kernels.surface.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
+from .._support.extras import require_packages
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import Array, as_array, as_points, require_not_negative, require_positive
 from .blocks import blocks
@@ -259,6 +260,7 @@ class Surface:
 
         The gradients that the fit is checked against are exact.
         """
+        require_packages("Surface.from_expression", "sympy")
         from .expressions import compile_expressions
 
         listed = [expressions] if isinstance(expressions, str) else list(expressions)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import shapely
 
 from ..._kernels.geodesics import contacts as kernels
 from ..._kernels.geodesics.newton import Strand
@@ -102,15 +103,15 @@ def adopted(around: Surroundings, band: Band) -> Band:
     """With the points held that lie at corners."""
     if len(around.corners) == 0:
         return band
-    from scipy.spatial import cKDTree
-
     reach = AT_CORNER * float(around.clearance.min())
-    distance, nearest = cKDTree(around.corners).query(band.points, distance_upper_bound=reach)
-    found = np.isfinite(distance) & (band.bends == NONE)
-    found[[0, -1]] = False
-    points = band.points.copy()
-    points[found] = around.corners[nearest[found]]
-    return replace(band, points=points, bends=np.where(found, nearest, band.bends))
+    near, corner = shapely.STRtree(shapely.points(around.corners)).query_nearest(
+        shapely.points(band.points), max_distance=reach, all_matches=False
+    )
+    free = ~band.is_held[near]
+    near, corner = near[free], corner[free]
+    points, bends = band.points.copy(), band.bends.copy()
+    points[near], bends[near] = around.corners[corner], corner
+    return replace(band, points=points, bends=bends)
 
 
 def projectors(around: Surroundings, band: Band) -> Array:

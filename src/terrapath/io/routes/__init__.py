@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
+from ..._support.extras import require_packages
 from ..._support.files import BAG_ENDING, folder_written_whole, written_whole
 from ...errors import MapError
 from ...problem import Solution
@@ -21,24 +23,31 @@ __all__ = [
     "write_route",
 ]
 
-# Each takes a solution that has a path, and a file that exists already, empty.
-WRITERS: dict[str, Callable[[Solution, Path], None]] = {
-    ".geojson": geojson.write,
-    ".gpkg": geopackage.write,
-    ".gpx": gpx.write,
-    ".csv": table.write,
-    ".json": write_json,
-    BAG_ENDING: ros.write,
+
+class Writer(NamedTuple):
+    """How a format is written, and by which packages of the extras."""
+
+    # Takes a solution that has a path, and a file that exists already, empty.
+    write: Callable[[Solution, Path], None]
+    packages: tuple[str, ...] = ()
+
+
+WRITERS = {
+    ".geojson": Writer(geojson.write),
+    ".gpkg": Writer(geopackage.write, ("geopandas", "pyogrio")),
+    ".gpx": Writer(gpx.write, ("gpxpy",)),
+    ".csv": Writer(table.write),
+    ".json": Writer(write_json),
+    BAG_ENDING: Writer(ros.write, ("rosbags",)),
 }
 
 
 def require_known_format(path: Path) -> None:
-    """Raise MapError for an ending that no writer has, or whose library is not installed."""
+    """Raise MapError for an ending that no writer has, MissingExtraError without its packages."""
     ending = path.suffix.lower()
     if ending not in WRITERS:
         raise MapError(f"output={str(path)!r} has no known format; end it in {', '.join(WRITERS)}")
-    if ending == BAG_ENDING:
-        ros.require_library(path)
+    require_packages(f"output={str(path)!r}", *WRITERS[ending].packages)
 
 
 def require_fitting_format(path: Path, georeference: Georeference | None) -> None:
@@ -61,4 +70,4 @@ def write_route(solution: Solution, path: str | Path) -> None:
     ending = target.suffix.lower()
     whole = folder_written_whole if ending == BAG_ENDING else written_whole
     with whole(target) as temporary:
-        WRITERS[ending](solution, temporary)
+        WRITERS[ending].write(solution, temporary)

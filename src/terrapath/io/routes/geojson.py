@@ -67,4 +67,4 @@ def write(solution: Solution, file: Path) -> None:
     }
     route = {"type": "Feature", "geometry": geometry, "properties": properties}
     collection = {"type": "FeatureCollection", "features": [route, *_vias(via, via_places)]}
-    file.write_text(dump(collection, indent=1), encoding="utf-8")
+    file.write_text(dump(collection), encoding="utf-8")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sqlite3
 import tempfile
 import warnings
 from collections.abc import Iterator, Mapping
@@ -102,6 +101,8 @@ def _require_whole(draft: Path, counts: Mapping[str, int]) -> None:
     Then SQLite finds a fault, or what is written last is missing: extents and counts, and the
     triggers that keep counts, of which each layer has as many as any other.
     """
+    import sqlite3
+
     found = "SELECT table_name, feature_count FROM gpkg_contents NATURAL JOIN gpkg_ogr_contents"
     triggers = "SELECT count(*) FROM sqlite_master WHERE type = 'trigger' AND tbl_name = ?"
     try:

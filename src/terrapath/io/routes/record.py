@@ -34,9 +34,9 @@ def _is_finite(array: NDArray[Any]) -> bool:
     return array.dtype.kind in "fiu" and bool(np.isfinite(array).all())
 
 
-def dump(record: Any, indent: int | None = None) -> str:
+def dump(record: Any) -> str:
     """Strict JSON; letters that no encoding can hold stay escaped."""
-    return json.dumps(plain(record), allow_nan=False, indent=indent) + "\n"
+    return json.dumps(plain(record), allow_nan=False) + "\n"
 
 
 def provenance(solution: Solution) -> dict[str, Any]:
@@ -56,7 +56,7 @@ def provenance(solution: Solution) -> dict[str, Any]:
     }
     found |= {key: value for key, value in known.items() if value}
     if surface.georeference is not None:
-        found["planned_in"] = surface.georeference.crs.to_string()
+        found["planned_in"] = surface.georeference.text
     return found
 
 
@@ -68,7 +68,7 @@ def _ends_in_degrees(solution: Solution) -> dict[str, Any]:
     problem, path = solution.problem, solution.path
     ends = reference.to_lonlat(np.array([problem.start, problem.goal]))
     return {
-        "crs": reference.crs.to_string(),
+        "crs": reference.text,
         "start_lonlat": ends[0],
         "goal_lonlat": ends[1],
         "path_lonlat": None if path is None else reference.to_lonlat(path.points),

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import sqlite3
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from ...errors import MapError
 from ...problem import Path as Route
 from ...problem import Solution
 from ...surface import Surface
@@ -22,14 +19,6 @@ TOPIC, FRAME = "/plan", "map"
 BAG_VERSION: Literal[8] = 8
 # No clock: the same route gives the same bytes, and ROS reads 0 as "whenever".
 STAMP = 0
-
-
-def require_library(path: Path) -> None:
-    """Raise MapError where rosbags is not installed."""
-    if find_spec("rosbags") is None:
-        raise MapError(
-            f"output={str(path)!r} needs the library rosbags; pip install 'terrapath[ros]'"
-        )
 
 
 def positions(surface: Surface, route: Route) -> Array:
@@ -81,6 +70,8 @@ def _message(solution: Solution, types: Any) -> Any:
 
 def write(solution: Solution, folder: Path) -> None:
     """A bag in a folder that does not exist yet."""
+    import sqlite3
+
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.rosbag2.errors import WriterError
     from rosbags.typesys import Stores, get_typestore

@@ -15,6 +15,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 from shapely.geometry.base import BaseGeometry
 
+from ..._support.extras import require_packages
 from ...errors import MapError, TerrapathWarning
 from ...space.free_space import Geometries, Indices, simple_parts
 
@@ -71,6 +72,7 @@ def _listed(path: Path) -> tuple[Path, list[str]]:
         if not file or not source.exists():
             raise MapError(f"{path} does not exist; check the path")
     _refuse_absurd_sizes(source)
+    require_packages(f"reading {source}", "pyogrio")
     import pyogrio
 
     with quietly(source):

@@ -1,0 +1,34 @@
+"""Packages that only some of Terrapath needs: installed on request, asked for here."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from ..errors import MissingExtraError
+
+# Each package, and the extra of Terrapath that installs it.
+EXTRA_OF = {
+    "geopandas": "vector",
+    "pandas": "vector",
+    "pyogrio": "vector",
+    "xarray": "xarray",
+    "h5netcdf": "xarray",
+    "sympy": "expressions",
+    "plotly": "page",
+    "gpxpy": "gpx",
+    "rosbags": "ros",
+}
+
+
+def require_packages(wanted: str, *packages: str) -> None:
+    """Raise MissingExtraError where a package of one of the extras is not installed.
+
+    wanted : what was asked for, the subject of the message. Nothing is imported yet, so this
+    can be asked before a long computation.
+    """
+    for package in packages:
+        if find_spec(package) is None:
+            raise MissingExtraError(
+                f"{wanted} needs the package {package}, which is not installed: "
+                f"pip install 'terrapath[{EXTRA_OF[package]}]'"
+            )
