@@ -8,9 +8,17 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks import bound, figures, fresh, large_maps, marching, paths, startup
-from benchmarks import report as reports
-from benchmarks import run as runs
+from benchmarks import (
+    bound,
+    figures,
+    fresh,
+    large_maps,
+    marching,
+    paths,
+    report as reports,
+    run as runs,
+    startup,
+)
 from benchmarks.__main__ import app
 from benchmarks.peers import SCIKIT_FMM, Peer
 from benchmarks.settings import SCENES, Scale, true_length

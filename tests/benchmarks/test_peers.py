@@ -21,9 +21,9 @@ from benchmarks import (
     problems,
     processes,
     programs,
+    run as runs,
     trees,
 )
-from benchmarks import run as runs
 from benchmarks.exchange import discs_of, panel_of, write_problem
 from benchmarks.peers import OMPL_PYTHON, Peer
 from benchmarks.settings import Scale

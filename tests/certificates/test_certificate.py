@@ -19,8 +19,7 @@ import terrapath as tp
 from certificate_cases import BOUNDS, certified
 from common import FLAT
 from processes import in_another_process
-from terrapath._kernels.certificates import norms as kernels
-from terrapath._kernels.certificates import surface_models, taylor
+from terrapath._kernels.certificates import norms as kernels, surface_models, taylor
 from terrapath.certificates import certificate, claims
 from terrapath.certificates.certificate import seal_of
 

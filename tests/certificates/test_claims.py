@@ -13,8 +13,7 @@ import pytest
 import certificate_oracles as oracles
 import terrapath as tp
 from certificate_cases import BOUNDS, SIDE, certified, random_surface, square
-from terrapath._kernels.certificates import norms as kernels
-from terrapath._kernels.certificates import surface_models
+from terrapath._kernels.certificates import norms as kernels, surface_models
 from terrapath.certificates import claims
 from terrapath.certificates.claims import Core
 

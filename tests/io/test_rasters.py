@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import rasterio
 import rasterio.crs
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pyproj import CRS, Geod, Transformer
 from rasterio import Affine
 

@@ -14,8 +14,7 @@ import pyogrio
 import pytest
 import rasterio
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pyproj import CRS, Geod, Transformer
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from terrapath._kernels.compiler import kernel
 from terrapath._kernels.vec4 import exp, four, four_in_row, fused, sqrt, total

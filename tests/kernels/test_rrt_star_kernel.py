@@ -10,9 +10,7 @@ import shapely
 
 import planner_oracles as oracles
 import terrapath as tp
-from terrapath._kernels.planners import rrt_star as kernels
-from terrapath._kernels.planners import sampling
-from terrapath._kernels.planners import tree as trees
+from terrapath._kernels.planners import rrt_star as kernels, sampling, tree as trees
 from terrapath.planners import tree_search
 from terrapath.problem import scenes
 

@@ -5,19 +5,18 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.interpolate import RectBivariateSpline
 
 import terrapath as tp
 from common import numbers, points_in
 from oracles import (
     exact_curve_length,
+    line_r as line_r_by_algorithm_1,
     metric_from_sympy,
     peaks_expressions,
     peaks_gradients,
 )
-from oracles import line_r as line_r_by_algorithm_1
 from terrapath.surface import metric
 
 BOUNDS = (-1.0, -1.0, 11.0, 11.0)

@@ -22,8 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import __version__ as numba_version
-from numba import config
+from numba import __version__ as numba_version, config
 
 from ..errors import KernelWarning
 from .fallback import is_plain

@@ -14,8 +14,7 @@ from .._support.watching import Watch, watch_nothing
 from ..errors import TerrapathWarning, told_to
 
 if TYPE_CHECKING:
-    from rich.progress import Progress as Bars
-    from rich.progress import TaskID
+    from rich.progress import Progress as Bars, TaskID
 
     from ..planners.base import Callback, Progress
 

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.distance import calendar_queue, dependents, descent, stencils
-from .._kernels.distance import eikonal as kernels
+from .._kernels.distance import calendar_queue, dependents, descent, eikonal as kernels, stencils
 from .._kernels.surface.metric_rows import ROWS, columns_of
 from ..errors import InputError, OutsideSurfaceError
 from ..problem import Path, Problem

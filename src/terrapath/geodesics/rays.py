@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .._kernels.geodesics import equation as kernels
-from .._kernels.geodesics import rays
+from .._kernels.geodesics import equation as kernels, rays
 from ..errors import InputError
 from ..surface import Surface
 from ..surface.bounds import Bounds

@@ -1,9 +1,5 @@
 from .fields import write_field as write_field
-from .maps import LayerSource as LayerSource
-from .maps import read_surface as read_surface
-from .routes import route_record as route_record
-from .routes import write_route as write_route
-from .vectors import read_area as read_area
-from .vectors import read_obstacles as read_obstacles
-from .vectors.layers import RepairedWarning as RepairedWarning
-from .vectors.layers import VectorWarning as VectorWarning
+from .maps import LayerSource as LayerSource, read_surface as read_surface
+from .routes import route_record as route_record, write_route as write_route
+from .vectors import read_area as read_area, read_obstacles as read_obstacles
+from .vectors.layers import RepairedWarning as RepairedWarning, VectorWarning as VectorWarning

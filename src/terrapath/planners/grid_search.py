@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.planners import grid_search as kernels
-from .._kernels.planners import tree as trees
+from .._kernels.planners import grid_search as kernels, tree as trees
 from ..errors import InputError
 from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .._kernels.planners import rrt_star as kernels
-from .._kernels.planners import tree as trees
+from .._kernels.planners import rrt_star as kernels, tree as trees
 from .._kernels.planners.buckets import Buckets
 from ..problem import History, Path, Problem, SearchTree, Solution, Status
 from ..surface import Surface

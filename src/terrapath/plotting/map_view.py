@@ -9,8 +9,7 @@ import shapely
 from matplotlib import colormaps, patheffects
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PatchCollection
-from matplotlib.patches import Circle as Disc
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Circle as Disc, PathPatch
 from matplotlib.path import Path as Outline
 from shapely import LineString, Point, Polygon
 

@@ -15,8 +15,7 @@ from .._support.files import written_whole
 from ..errors import MapError
 from ..io.routes.profile import clean, slopes
 from ..io.routes.units import height_scale
-from ..problem import Path as Route
-from ..problem import Solution
+from ..problem import Path as Route, Solution
 from ..space.free_space import sort_obstacles
 from ..validation import Array
 from .labels import format_length

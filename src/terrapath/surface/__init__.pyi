@@ -2,5 +2,4 @@ from . import metric as metric
 from .layers import Layer as Layer
 from .mask import Mask as Mask
 from .smoothing import Smoothing as Smoothing
-from .surface import Fit as Fit
-from .surface import Surface as Surface
+from .surface import Fit as Fit, Surface as Surface

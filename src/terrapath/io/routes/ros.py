@@ -7,8 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...problem import Path as Route
-from ...problem import Solution
+from ...problem import Path as Route, Solution
 from ...surface import Surface
 from ...validation import Array
 from .profile import headings, slopes
