@@ -1,7 +1,5 @@
 """What goes wrong with an input. Every message names the value, the limit and the remedy."""
 
-import warnings
-
 
 class TerrapathError(Exception):
     """Base of every error that Terrapath raises on purpose. The command exits with 2."""
@@ -37,9 +35,3 @@ class TerrapathWarning(UserWarning):
 
 class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded, and is left out or given as it was before."""
-
-
-def warn_unfinished(what: str, error: Exception) -> None:
-    """Tell what could not be done, and why."""
-    reason = " ".join(f"{type(error).__name__}: {error}".split())
-    warnings.warn(f"{what}: {reason}", UnfinishedWarning, stacklevel=3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -164,8 +163,6 @@ def _block_means(values: Array, factor: int) -> Array:
     cut = values[: rows * factor, : columns * factor]
     cells = cut.reshape(rows, factor, columns, factor)
     known = np.isfinite(cells).sum(axis=(1, 3))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of an empty block
-        means: Array = np.nanmean(cells, axis=(1, 3))
-    means[known < LEAST_SHARE * factor * factor] = np.nan
-    return means
+    means = np.full(known.shape, np.nan)
+    enough = known >= LEAST_SHARE * factor * factor
+    return np.divide(np.nansum(cells, axis=(1, 3)), known, out=means, where=enough)
