@@ -14,7 +14,7 @@ from pyproj import CRS, Geod, Transformer
 import terrapath as tp
 from helpers import one_line
 from oracles import is_blocked
-from terrapath.io.maps import LayerSource
+from terrapath.io.sources import LayerSource
 from terrapath.surface.georeference import Georeference
 from terrapath.surface.raster import Raster
 

@@ -19,7 +19,7 @@ from .remarks import remark, remarks
 from .reproduce import reproduce_command
 from .scenes import scenes_command
 from .schema import schema_command
-from .streams import settle
+from .streams import settle, without_broken_messages
 from .warmup import warmup_command
 
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
@@ -78,7 +78,7 @@ def run(arguments: list[str] | None = None, command: typer.Typer = app) -> int:
     """Run the command and return its exit code; no error escapes as a traceback."""
     given = sys.argv[1:] or ["--help"] if arguments is None else arguments
     try:
-        with remarks():
+        with remarks(), without_broken_messages():
             return command(given, standalone_mode=False) or ExitCode.SOLVED
     except UsageError as error:
         return _fail(error.format_message())

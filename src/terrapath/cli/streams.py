@@ -1,10 +1,37 @@
-"""Standard output and standard error where nobody reads them, or no disk takes them."""
+"""Standard output and standard error: what goes there, and where it can go nowhere."""
 
 from __future__ import annotations
 
 import os
-from contextlib import suppress
-from typing import TextIO
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TextIO
+
+
+@contextmanager
+def without_broken_messages() -> Iterator[None]:
+    """Silence where a message of GDAL is no text, as of a damaged file that it quotes.
+
+    Rasterio decodes messages in a callback of GDAL, whatever its log's level. Where that fails
+    Python prints it, by both hooks of the interpreter. They are the process's: only the command,
+    whose process it is, sets them.
+    """
+    uncaught, unraisable = sys.excepthook, sys.unraisablehook
+
+    def of_uncaught(kind: Any, error: Any, trace: Any) -> None:
+        if not issubclass(kind, UnicodeDecodeError):
+            uncaught(kind, error, trace)
+
+    def of_unraisable(what: Any) -> None:
+        if "rasterio" not in str(what.object):
+            unraisable(what)
+
+    sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable
+    try:
+        yield
+    finally:
+        sys.excepthook, sys.unraisablehook = uncaught, unraisable
 
 
 def settle(*streams: TextIO | None) -> None:

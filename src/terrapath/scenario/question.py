@@ -122,7 +122,7 @@ class Question:
         self._require_map()
         band = 1 if asked.height_band is None else asked.height_band
         window = self.scenario.route.bounds
-        return count_cells(asked.path, height_band=band, crs=asked.crs, within=window)
+        return count_cells(asked.path or "", height_band=band, crs=asked.crs, within=window)
 
     def place(self, part: Part | None = None) -> Place:
         """The scene or the map, weighted, and the region to plan in."""
@@ -168,7 +168,7 @@ class Question:
         if part is not None:
             window, decimate = part.within or window, part.decimate
         surface = read_surface(
-            asked.path,
+            asked.path or "",
             within=window,
             # What is blocked beyond the bounds keeps the vehicle off, too.
             margin=self.scenario.constraints.radius,

@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 from ..._support.files import BAG_ENDING, folder_written_whole, written_whole
 from ...errors import MapError
 from ...problem import Solution
 from ...surface.georeference import Georeference
-from . import geojson, geopackage, gpx, ros, table
-from .record import provenance, route_record, write_json
 
 __all__ = [
     "WRITERS",
-    "provenance",
     "require_fitting_format",
     "require_known_format",
-    "route_record",
     "write_route",
 ]
 
-# Each takes a solution that has a path, and a file that exists already, empty.
-WRITERS: dict[str, Callable[[Solution, Path], None]] = {
-    ".geojson": geojson.write,
-    ".gpkg": geopackage.write,
-    ".gpx": gpx.write,
-    ".csv": table.write,
-    ".json": write_json,
-    BAG_ENDING: ros.write,
+# Endings, and the modules that are imported to write them. The ``write`` of each takes a solution
+# that has a path, and a file that exists already, empty.
+WRITERS = {
+    ".geojson": "geojson",
+    ".gpkg": "geopackage",
+    ".gpx": "gpx",
+    ".csv": "table",
+    ".json": "record",
+    BAG_ENDING: "ros",
 }
+
+
+def _writer(ending: str) -> ModuleType:
+    return import_module(f".{WRITERS[ending]}", __name__)
 
 
 def require_known_format(path: Path) -> None:
@@ -38,14 +40,14 @@ def require_known_format(path: Path) -> None:
     if ending not in WRITERS:
         raise MapError(f"output={str(path)!r} has no known format; end it in {', '.join(WRITERS)}")
     if ending == BAG_ENDING:
-        ros.require_library(path)
+        _writer(ending).require_library(path)
 
 
 def require_fitting_format(path: Path, georeference: Georeference | None) -> None:
     """Raise MapError where a route on this plane has no place in the format (GPX off Earth)."""
     require_known_format(path)
     if path.suffix.lower() == ".gpx":
-        gpx.require_earth(path, georeference)
+        _writer(".gpx").require_earth(path, georeference)
 
 
 def write_route(solution: Solution, path: str | Path) -> None:
@@ -61,4 +63,4 @@ def write_route(solution: Solution, path: str | Path) -> None:
     ending = target.suffix.lower()
     whole = folder_written_whole if ending == BAG_ENDING else written_whole
     with whole(target) as temporary:
-        WRITERS[ending](solution, temporary)
+        _writer(ending).write(solution, temporary)
