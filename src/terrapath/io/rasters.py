@@ -37,8 +37,12 @@ def gdal() -> Iterator[None]:
     Datasets are of one thread, too: each call opens its own.
     """
     import rasterio
+    from rasterio.env import get_gdal_config, set_gdal_config
 
-    with rasterio.Env(GDAL_HTTP_TIMEOUT=SECONDS_FOR_NETWORK):
+    # Not as an option of the Env: in the main thread that is the process's, and comes and goes.
+    if get_gdal_config("GDAL_HTTP_TIMEOUT") is None:
+        set_gdal_config("GDAL_HTTP_TIMEOUT", SECONDS_FOR_NETWORK)
+    with rasterio.Env():
         yield
 
 

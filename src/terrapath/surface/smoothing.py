@@ -31,6 +31,10 @@ class Smoothing:
         meter.add(after - before)
         return meter.smoothing(scale)
 
+    def resolution(self, spacing: float) -> float:
+        """The size of the smallest features of samples so far apart, map units."""
+        return max(spacing, self.scale / FEATURES_PER_SCALE)
+
     def __str__(self) -> str:
         largest, rms = (
             ", ".join(f"{value:.2g}" for value in changes)
@@ -72,13 +76,11 @@ def scale_for_step(step: float, cell: float) -> float:
     return scale if scale >= 0.5 * cell else 0.0
 
 
-def check_scale(smoothing: float | None, bounds: Bounds) -> float:
-    """The scale of a smoothing, map units; 0 for none.
+def check_scale(smoothing: float, bounds: Bounds) -> float:
+    """The scale of a smoothing, map units.
 
     Raises InputError where it is not finite, below 0 or larger than the map.
     """
-    if smoothing is None:
-        return 0.0
     require_not_negative(smoothing=smoothing)
     side = min(bounds.width, bounds.height)
     if smoothing > side:
