@@ -168,7 +168,8 @@ import sys, warnings, numpy, rasterio, terrapath
 path = sys.argv[1]
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
-    with rasterio.open(path, "w", driver="GTiff", width=9, height=9, count=1, dtype="float32") as file:
+    size = {"width": 9, "height": 9, "count": 1, "dtype": "float32"}
+    with rasterio.open(path, "w", driver="GTiff", **size) as file:
         file.write(numpy.ones((1, 9, 9), "float32"))
 with warnings.catch_warnings(record=True) as shown:
     warnings.simplefilter("always")
