@@ -12,8 +12,7 @@ from terrapath.errors import InputError
 from terrapath.planners.tree_search import FEATURES_PER_PANEL
 from terrapath.problem import Problem
 from terrapath.space.free_space import Circle
-from terrapath.surface.bounds import Bounds
-from terrapath.surface.mask import Mask
+from terrapath.surface.bounds import Bounds, Mask
 from terrapath.validation import Array
 
 PEAKS, SPLINE = 0.0, 1.0

@@ -1,10 +1,5 @@
 """What goes wrong with an input. Every message names the value, the limit and the remedy."""
 
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
-
 
 class TerrapathError(Exception):
     """Base of every error that Terrapath raises on purpose. The command exits with 2."""
@@ -48,45 +43,3 @@ class KernelWarning(TerrapathWarning, RuntimeWarning):
 
 class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded, and is left out or given as it was before."""
-
-
-def warn_unfinished(what: str, error: Exception) -> None:
-    """Tell what could not be done, and why."""
-    reason = " ".join(f"{type(error).__name__}: {error}".split())
-    tell(UnfinishedWarning(f"{what}: {reason}"))
-
-
-_LISTENER: ContextVar[Callable[[TerrapathWarning], None] | None] = ContextVar(
-    "listener", default=None
-)
-
-
-def tell(warning: TerrapathWarning) -> None:
-    listener = _LISTENER.get()
-    if listener is None:
-        warnings.warn(warning, stacklevel=3)
-    else:
-        listener(warning)
-
-
-@contextmanager
-def told_to(listener: Callable[[TerrapathWarning], None]) -> Iterator[None]:
-    before = _LISTENER.set(listener)
-    try:
-        yield
-    finally:
-        _LISTENER.reset(before)
-
-
-@contextmanager
-def collecting() -> Iterator[list[TerrapathWarning]]:
-    told: list[TerrapathWarning] = []
-    outer = _LISTENER.get()
-
-    def note(warning: TerrapathWarning) -> None:
-        told.append(warning)
-        if outer is not None:
-            outer(warning)
-
-    with told_to(note):
-        yield told

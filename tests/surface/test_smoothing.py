@@ -11,8 +11,9 @@ from scipy.ndimage import gaussian_filter1d
 
 import terrapath as tp
 from common import one_line, points_in
+from terrapath.io.bands import quantisation_step
 from terrapath.paper import nonsmooth
-from terrapath.surface.smoothing import quantisation_step, scale_for_step, smooth
+from terrapath.surface.smoothing import scale_for_step, smooth
 
 BOUNDS = (-5.0, -5.0, 5.0, 5.0)
 scales = st.floats(0.05, 4.0)

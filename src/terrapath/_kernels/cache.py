@@ -15,7 +15,6 @@ import pickle
 import platform
 import re
 import uuid
-import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -24,6 +23,7 @@ from typing import Any
 
 from numba import __version__ as numba_version, config
 
+from .._support.telling import tell
 from ..errors import KernelWarning
 from .fallback import is_plain
 
@@ -155,7 +155,7 @@ def _failed(error: Exception) -> None:
     )
     _failures.append(message)
     if len(_failures) == 1:
-        warnings.warn(message, KernelWarning, stacklevel=2)
+        tell(KernelWarning(message))
 
 
 class KernelCache:

@@ -8,12 +8,12 @@ The plain way asks Numba for nothing special and gives the same answers.
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from numba import __version__ as numba_version
 
+from .._support.telling import tell
 from ..errors import KernelWarning
 
 # The first version of Numba that linking is tested with, and the first that it is not tested
@@ -40,11 +40,11 @@ def _warn(reason: object) -> None:
         f"{sign}{major}.{minor}"
         for sign, (major, minor) in ((">=", TESTED_FROM), ("<", TESTED_BELOW))
     )
-    warnings.warn(
-        f"kernels are compiled in a slower way, with the same answers: {reason}; install "
-        f"'numba{wanted}'",
-        KernelWarning,
-        stacklevel=2,
+    tell(
+        KernelWarning(
+            f"kernels are compiled in a slower way, with the same answers: {reason}; install "
+            f"'numba{wanted}'"
+        )
     )
 
 

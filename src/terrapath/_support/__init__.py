@@ -1,1 +1,1 @@
-"""What every package may use: files, memory, and who watches long work."""
+"""What every package may use: files, memory, who watches long work, and who is told."""

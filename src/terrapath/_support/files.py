@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -65,12 +67,12 @@ def _require_name(path: Path) -> None:
 def written_whole(path: Path) -> Iterator[Path]:
     """A temporary path beside ``path``; it takes its place only when all went well."""
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=TEMPORARY, suffix=path.suffix)
-        os.close(handle)
-        temporary = Path(name)
+        temporary = path.parent / f"{TEMPORARY}{secrets.token_hex(8)}{path.suffix}"
+        # A new file of nobody else's, which may be read by whom the process lets: one of
+        # ``tempfile`` would be ours alone, and the process's mask cannot be read, only set.
+        temporary.touch(exist_ok=False)
         try:
             yield temporary
-            temporary.chmod(0o666 & ~_umask())
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
@@ -87,9 +89,10 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
     try:
         _require_bag(path)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=TEMPORARY) as aside:
-            made, old = Path(aside) / path.name, Path(aside) / "replaced"
+            made, old, new = (Path(aside, name) for name in (path.name, "replaced", "new"))
+            new.mkdir()
             yield made
-            made.chmod(0o777 & ~_umask())
+            made.chmod(stat.S_IMODE(new.stat().st_mode))  # as the process makes folders
             if path.exists():
                 path.rename(old)
             try:
@@ -108,10 +111,3 @@ def _unwritten(path: Path, error: OSError) -> MapError:
         f"{path} could not be written: {reason}; "
         "name a file in a directory with room, that exists and that you may write to"
     )
-
-
-def _umask() -> int:
-    """The process's file mode mask, which can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

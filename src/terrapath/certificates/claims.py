@@ -21,7 +21,7 @@ from ..errors import CertificateError
 from ..problem import Problem
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
-from ..surface.costs import span_within
+from ..surface.layers import span_within
 from ..validation import Array
 
 # Far above the rounding of the checker's own arithmetic, far below any gap.

@@ -8,10 +8,11 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
+from .._support.telling import told_to
 from .._support.watching import Watch, watch_nothing
-from ..errors import TerrapathWarning, told_to
+from ..errors import TerrapathWarning
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars, TaskID
@@ -51,6 +52,31 @@ def remarks() -> Iterator[None]:
 
     with told_to(show):
         yield
+
+
+@contextmanager
+def without_broken_messages() -> Iterator[None]:
+    """Silence where a message of GDAL is no text, as of a damaged file that it quotes.
+
+    Rasterio decodes messages in a callback of GDAL, whatever its log's level. Where that fails
+    Python prints it, by both hooks of the interpreter. They are the process's: only the command,
+    whose process it is, sets them.
+    """
+    uncaught, unraisable = sys.excepthook, sys.unraisablehook
+
+    def of_uncaught(kind: Any, error: Any, trace: Any) -> None:
+        if not issubclass(kind, UnicodeDecodeError):
+            uncaught(kind, error, trace)
+
+    def of_unraisable(what: Any) -> None:
+        if "rasterio" not in str(what.object):
+            unraisable(what)
+
+    sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable
+    try:
+        yield
+    finally:
+        sys.excepthook, sys.unraisablehook = uncaught, unraisable
 
 
 def settle(*streams: TextIO | None) -> None:

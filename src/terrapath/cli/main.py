@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TerrapathError
-from .console import ExitCode, remark, remarks, settle
+from .console import ExitCode, remark, remarks, settle, without_broken_messages
 
 # Typer brings its own copy of Click, or uses the installed one, by version; the base of
 # its usage errors is reached through the one it exports.
@@ -76,7 +76,7 @@ def run(arguments: list[str] | None = None, command: typer.Typer | None = None) 
     """Run the command and return its exit code; no error escapes as a traceback."""
     given = sys.argv[1:] or ["--help"] if arguments is None else arguments
     try:
-        with remarks():
+        with remarks(), without_broken_messages():
             app = command or application(_asked(given))
             return app(given, standalone_mode=False) or ExitCode.SOLVED
     except UsageError as error:

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import shapely
 
+from .._support.telling import tell_unfinished
 from ..distance.field import DistanceField, Medium, march_from
-from ..errors import warn_unfinished
 from ..problem import Path, Problem
 from ..space.lattice import Lattice
 from ..validation import Array, require_count, require_positive
@@ -61,7 +61,7 @@ def alternatives(
     if failures and not found:
         raise failures[0]
     if failures:
-        warn_unfinished("not every route could be refined; the others are given", failures[0])
+        tell_unfinished("not every route could be refined; the others are given", failures[0])
     return shortest(found, count)
 
 

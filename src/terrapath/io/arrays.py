@@ -38,19 +38,15 @@ class ArrayBand(Band):
         with reading(self.label, is_file=False):  # an xarray object reads its file only now
             part = self.array[rows, columns]
             part = np.ma.asarray(getattr(part, "values", part))
-        stored = np.ma.filled(part.astype(float), np.nan)
-        values: Array = np.array(stored, dtype=np.float64)
-        for value in self.no_data:
-            values[values == value] = np.nan
-        values *= self.scale
-        values += self.offset
+        with np.errstate(over="ignore", invalid="ignore"):
+            stored = np.ma.filled(part.astype(float), np.nan)
+            values: Array = np.array(stored, dtype=np.float64)
+            for value in self.no_data:
+                values[values == value] = np.nan
+            values *= self.scale
+            values += self.offset
         values[~np.isfinite(values)] = np.nan
         return values
-
-
-def is_xarray(source: Any) -> bool:
-    """Is it an xarray object? Asked without importing xarray."""
-    return type(source).__module__.split(".")[0] == "xarray"
 
 
 def band_of_numpy(source: tuple[Any, Any, Any], which: int | str, crs: CRS | None) -> ArrayBand:

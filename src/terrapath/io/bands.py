@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +14,15 @@ from ..errors import MapError
 from ..surface.blocks import BLOCK
 from ..surface.bounds import Bounds
 from ..surface.grid import Grid
+from ..surface.layers import Kind
 from ..validation import Array
 
 MARGIN = 8  # cells around a window: what lies beyond moves the spline by 1e-4 of itself
 SAMPLED_STRIPS = 8
 SAMPLED_ROWS = 16
 LEAST_SHARE = 0.5  # of a coarse cell that must have data
+FEWEST_LEVELS = 16  # of distinct heights, from which their step can be told
+MOST_LOOKED_AT = 1_000_000  # heights that the step is sought in
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,15 @@ class Band(ABC):
     def rows_at_once(self) -> int:
         """How many rows lie together in the file."""
         return 1
+
+
+class Part(NamedTuple):
+    """A layer on its way onto the map's grid."""
+
+    name: str
+    kind: Kind
+    weight: float
+    band: Band
 
 
 @dataclass(frozen=True)
@@ -150,6 +162,20 @@ class View:
             ]
         )
 
+    def read_as(self, target: Grid, out: Array) -> bool:
+        """Read into ``out`` where the target has the same cells, in either order of the rows.
+
+        False, and nothing is read, where it has others.
+        """
+        grid = self.grid
+        if grid.crs == target.crs and grid.is_same(target):
+            self.read_into(out)
+        elif grid.crs == target.crs and grid.flipped().is_same(target):
+            self.read_into(out[::-1])
+        else:
+            return False
+        return True
+
     def read_into(self, out: Array) -> None:
         """Values of the grid's cells into ``out`` (rows, columns)."""
         for start, strip in self._strips():
@@ -164,8 +190,31 @@ def _block_means(values: Array, factor: int) -> Array:
     cut = values[: rows * factor, : columns * factor]
     cells = cut.reshape(rows, factor, columns, factor)
     known = np.isfinite(cells).sum(axis=(1, 3))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of an empty block
-        means: Array = np.nanmean(cells, axis=(1, 3))
-    means[known < LEAST_SHARE * factor * factor] = np.nan
+    means = np.full(known.shape, np.nan)
+    enough = known >= LEAST_SHARE * factor * factor
+    np.divide(np.nansum(cells, axis=(1, 3)), known, out=means, where=enough)
     return means
+
+
+def quantisation_step(values: Array) -> float:
+    """The step that heights are rounded to; 0 where they are not, or it cannot be told.
+
+    values : any shape, NaN where unknown. Found where the gaps between all distinct values are
+    multiples of the smallest, to the precision of 32-bit numbers.
+    """
+    flat = values.reshape(-1)
+    looked_at = flat[:: max(1, flat.size // MOST_LOOKED_AT)]
+    levels = np.unique(looked_at[np.isfinite(looked_at)])
+    if len(levels) < FEWEST_LEVELS:
+        return 0.0
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond 32 bits nothing is told
+        rounding = float(np.spacing(np.float32(np.abs(levels).max())))
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 2.0 * rounding]
+    # Differences that 32-bit numbers can hardly hold are no step that anybody chose.
+    if len(gaps) < FEWEST_LEVELS - 1 or (least := float(gaps.min())) < 8.0 * rounding:
+        return 0.0
+    multiples = np.rint(gaps / least)
+    step = float(gaps.sum() / multiples.sum())
+    off = np.abs(gaps - multiples * step)
+    return step if float(off.max()) <= 2.0 * rounding + 1e-9 * step else 0.0

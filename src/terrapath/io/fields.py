@@ -33,7 +33,6 @@ def _tags(field: DistanceField) -> dict[str, Any]:
 
 def _write_geotiff(field: DistanceField, file: Path) -> None:
     """One band of float64, deflated."""
-    import rasterio
     from rasterio.io import MemoryFile
 
     values, transform = _north_up(field)
@@ -51,7 +50,7 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
         "predictor": 3,
     }
     # By way of memory: GDAL does not tell of every failure to write, and may add a side file.
-    with rasterio.Env(GDAL_PAM_ENABLED=False), MemoryFile() as memory:
+    with MemoryFile() as memory:
         with memory.open(**profile) as dataset:
             dataset.write(values, 1)
             dataset.set_band_description(1, f"distance ({unit})" if unit else "distance")

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import logging
 import re
-import sys
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,13 +14,13 @@ from pyproj import CRS
 from rasterio import Affine
 
 from .._support.extras import require_packages
+from .._support.telling import silence
 from ..errors import MapError, TerrapathError
 from ..surface.georeference import parse_crs
 from ..surface.grid import Grid
 from ..validation import Array
 from .bands import Band
 
-CACHE_MEGABYTES = 128  # of GDAL's blocks; its own default is a twentieth of the memory
 MOST_BLOCK_BYTES = 2 * 2**30
 SECONDS_FOR_NETWORK = 30
 
@@ -36,41 +33,18 @@ HEIGHT_NAMES = (
 
 @contextmanager
 def gdal() -> Iterator[None]:
-    """GDAL with a small cache, and silent: what matters comes back as an error."""
-    import rasterio
+    """GDAL for this thread; what it has to say is logged, and what matters comes as an error.
 
-    # Python prints warnings of loggers that nobody listens to.
-    logging.getLogger("rasterio").addHandler(logging.NullHandler())
-    with (
-        warnings.catch_warnings(),
-        _without_broken_messages(),
-        rasterio.Env(GDAL_CACHEMAX=CACHE_MEGABYTES, GDAL_HTTP_TIMEOUT=SECONDS_FOR_NETWORK),
-    ):
-        warnings.simplefilter("ignore")
-        yield
-
-
-@contextmanager
-def _without_broken_messages() -> Iterator[None]:
-    """Silence where a message of GDAL is no text: rasterio cannot log it, and prints that.
-
-    It does so by both hooks of the interpreter, from within a callback of GDAL.
+    Datasets are of one thread, too: each call opens its own.
     """
-    uncaught, unraisable = sys.excepthook, sys.unraisablehook
+    import rasterio
+    from rasterio.env import get_gdal_config, set_gdal_config
 
-    def of_uncaught(kind: Any, error: Any, trace: Any) -> None:
-        if not issubclass(kind, UnicodeDecodeError):
-            uncaught(kind, error, trace)
-
-    def of_unraisable(what: Any) -> None:
-        if "rasterio" not in str(what.object):
-            unraisable(what)
-
-    sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable
-    try:
+    # Not as an option of the Env: in the main thread that is the process's, and comes and goes.
+    if get_gdal_config("GDAL_HTTP_TIMEOUT") is None:
+        set_gdal_config("GDAL_HTTP_TIMEOUT", SECONDS_FOR_NETWORK)
+    with rasterio.Env():
         yield
-    finally:
-        sys.excepthook, sys.unraisablehook = uncaught, unraisable
 
 
 @contextmanager
@@ -184,6 +158,8 @@ def open_classic_netcdf(path: Path, files: Any) -> Any:
     require_packages(f"{path}, netCDF of the classic format,", "xarray")
     import xarray
 
+    # Of attributes that contradict one another; where it matters, values are missing.
+    silence(xarray.SerializationWarning, "xarray.conventions")
     with reading(path):
         return files.enter_context(
             xarray.open_dataset(path, engine="scipy", decode_times=False, cache=False)
@@ -191,9 +167,22 @@ def open_classic_netcdf(path: Path, files: Any) -> Any:
 
 
 def _open(path: str | Path) -> Any:
-    import rasterio
+    """The dataset, by way of credentials where the name asks for them, as in s3:."""
+    from rasterio.env import ensure_env_with_credentials
+    from rasterio.errors import NotGeoreferencedWarning
 
-    return rasterio.open(path)
+    silence(NotGeoreferencedWarning, __name__)
+    return ensure_env_with_credentials(_dataset)(path)
+
+
+def _dataset(path: str | Path) -> Any:
+    """As ``rasterio.open``, but what that warns of is then said of this module, not of its own.
+
+    So those who open datasets themselves still hear of missing georeferences.
+    """
+    from rasterio.io import DatasetReader
+
+    return DatasetReader(path)
 
 
 def _variable(path: str | Path, dataset: Any, name: str | None) -> str:

@@ -7,9 +7,9 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
+from .._support.telling import tell_unfinished
 from ..certificates.certificate import Certificate
 from ..certificates.search import lower_bound
-from ..errors import warn_unfinished
 from ..geodesics.refinement import refine
 from ..problem import Problem, Solution, Status
 from ..validation import require_bool, require_positive
@@ -105,7 +105,7 @@ def refined(solution: Solution, *, callback: Callback | None = None) -> Solution
     except KeyboardInterrupt:
         return _interrupted(solution)
     except Exception as error:
-        warn_unfinished("the path could not be refined and is the planner's own", error)
+        tell_unfinished("the path could not be refined and is the planner's own", error)
         return solution
     seconds = solution.seconds + time.perf_counter() - started
     return replace(solution, path=path, unrefined=given, seconds=seconds)
@@ -149,7 +149,7 @@ def bounded(
     except KeyboardInterrupt:
         solution = _interrupted(solution)
     except Exception as error:
-        warn_unfinished("no better bound could be proven", error)
+        tell_unfinished("no better bound could be proven", error)
     solution = replace(solution, seconds=before + time.perf_counter() - started)
     return solution if best is None else with_certificate(solution, best)
 

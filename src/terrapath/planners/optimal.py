@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from .._support.telling import tell_unfinished
 from ..distance.field import DistanceField, Medium, march_from
-from ..errors import warn_unfinished
 from ..geodesics.alternatives import routes_of_fields, shortest
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
@@ -131,7 +131,7 @@ class _Run:
         if failures:
             some = "not every route could be refined"
             none = "no route could be refined; the path is fast marching's"
-            warn_unfinished(some if found else none, failures[0])
+            tell_unfinished(some if found else none, failures[0])
 
     def answer(self) -> Solution:
         """What was found, without a bound."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import sys
-import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -16,10 +15,11 @@ import shapely
 
 from .._kernels import cache, compiler
 from .._support.files import written_whole
+from .._support.telling import collecting
 from .._support.watching import Watch, watch_nothing
 from ..certificates.search import lower_bound
 from ..distance.field import distance_field
-from ..errors import InputError, KernelWarning, MapError
+from ..errors import InputError, MapError
 from ..geodesics import christoffel_symbols, gaussian_curvature
 from ..geodesics.alternatives import alternatives
 from ..geodesics.refinement import refine
@@ -182,8 +182,7 @@ def warm_up(watch: Watch = watch_nothing) -> Warmth:
     if names is not None:
         return _warmth(directory, names, 0)
     before = cache.kept_files()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", KernelWarning)  # which is the error below
+    with collecting():  # of kernels that cannot be kept: that is the error below
         _rehearse_all(rehearsals(), watch)
     if (failure := cache.unkept()) is not None:
         raise MapError(failure)

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError, TerrapathWarning, collecting
+from .._support.telling import collecting
+from ..errors import InputError, TerrapathWarning
 from ..planners.base import Callback
 from .option import Point
 from .question import Itinerary, Question, asked

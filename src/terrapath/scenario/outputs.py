@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, MapError, UnfinishedWarning, tell
+from .._support.telling import tell
+from ..errors import InputError, MapError, UnfinishedWarning
 from .sections import OutputSection
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ from .sections import LayerTable, MapSection
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from ..io.maps import LayerSource, OpenMap
+    from ..io.maps import OpenMap
+    from ..io.sources import LayerSource
     from ..planners.corridor import Corridor, Part
     from ..problem import Problem
     from ..surface import Surface
@@ -52,9 +53,10 @@ def asked(scenario: Scenario) -> Iterator[Question]:
         return
     from ..io.maps import open_map
 
-    require_map(place.path or "")
+    name = place.path or ""
+    require_map(name)
     with open_map(
-        place.path,
+        name,
         height_band=1 if place.height_band is None else place.height_band,
         layers=_sources(place.layers),
         costs=_sources(place.costs),
@@ -66,7 +68,7 @@ def asked(scenario: Scenario) -> Iterator[Question]:
 
 
 def _sources(tables: dict[str, LayerTable]) -> dict[str, LayerSource]:
-    from ..io.maps import LayerSource
+    from ..io.sources import LayerSource
 
     return {
         name: LayerSource.of_file(table.file, table.band, table.weight)

@@ -1,5 +1,5 @@
 from . import metric as metric
+from .bounds import Mask as Mask
 from .layers import Layer as Layer
-from .mask import Mask as Mask
 from .smoothing import Smoothing as Smoothing
 from .surface import Fit as Fit, Surface as Surface

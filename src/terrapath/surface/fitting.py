@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from .._kernels.surface.tridiagonal import solve_curvatures
 from ..errors import FitError, InputError
 from ..validation import Array
 from .blocks import blocks
-from .bounds import Bounds
-from .mask import uniform_spacing
-from .smoothing import FEATURES_PER_SCALE, ChangeMeter, Smoothing, smooth, smooth_in_place
+from .bounds import Bounds, uniform_spacing
+
+if TYPE_CHECKING:
+    from .smoothing import Smoothing
 
 Function = Callable[[Array, Array], Array]
 
@@ -161,6 +162,8 @@ def _largest_error(spline: Spline, x: Array, y: Array, values: Array) -> float:
 
 def _change(scale: float, before: Spline, after: Spline, x: Array, y: Array) -> Smoothing:
     """What smoothing changed at the samples."""
+    from .smoothing import ChangeMeter
+
     change = ChangeMeter(len(before.weights))
     for rows in blocks(len(y), len(x)):
         change.add(_at_samples(after, x, y[rows]) - _at_samples(before, x, y[rows]))
@@ -183,6 +186,8 @@ def fit_grid(
     error = _largest_error(spline, x, y, values)
     if scale == 0.0:
         return GridFit(spline, error, None)
+    from .smoothing import smooth_in_place
+
     padded = _padded(resampled)
     smooth_in_place(padded[:, 1:-1, 1:-1], spline.dx, spline.dy, scale)
     smoothed = _spline_of(padded, fine_x, fine_y, weights)
@@ -329,6 +334,8 @@ def fit_smoothed(f: Function, bounds: Bounds, scale: float) -> FunctionFit:
     The error is what smoothing every other sample only would have changed; the spline
     through all samples is nearer to the truth than that.
     """
+    from .smoothing import FEATURES_PER_SCALE, Smoothing, smooth
+
     x = _axis_for(scale, bounds.x1_min, bounds.x1_max)
     y = _axis_for(scale, bounds.x2_min, bounds.x2_max)
     values = _checked(f, *np.meshgrid(x, y))

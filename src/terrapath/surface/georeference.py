@@ -30,6 +30,9 @@ LENGTH_UNITS = {
     **dict.fromkeys(("yd", "yard", "yards"), 0.9144),
 }
 
+# Metres that a projection's scale is measured over: far above rounding, below what bends it.
+SCALE_STEP = 100.0
+
 
 def metres_of(unit: str) -> float | None:
     """Length of a unit in metres; None where it is none of length."""
@@ -90,15 +93,37 @@ def transformer(source: CRS, target: CRS) -> Transformer:
 def worst_scale(crs: CRS, x: Array, y: Array) -> float:
     """How far, at worst, lengths on a projection are off at points: 0.01 for 1 %.
 
-    Infinite where the projection does not reach the points.
+    Tissot's ellipse by differences. ``pyproj.Proj`` has it too, but sets the process's filters of
+    warnings and puts them back, which other threads see. Infinite where the projection does not
+    reach the points.
     """
-    from pyproj import Proj
+    step = SCALE_STEP / crs.axis_info[0].unit_conversion_factor
+    along_x = _on_body(crs, x + step, y) - _on_body(crs, x - step, y)
+    along_y = _on_body(crs, x, y + step) - _on_body(crs, x, y - step)
+    # Metres on the ground in one of the plane, (points, 3, 2).
+    ground = np.stack([along_x, along_y], axis=-1).swapaxes(0, 1) / (2.0 * SCALE_STEP)
+    if not np.isfinite(ground).all():
+        return np.inf
+    with np.errstate(divide="ignore"):
+        scales = 1.0 / np.linalg.svd(ground, compute_uv=False)
+    return float(np.abs(scales - 1.0).max())
 
-    assert crs.geodetic_crs is not None
-    lonlat = transformer(crs, crs.geodetic_crs).transform(x, y)
-    factors = Proj(crs).get_factors(*lonlat, errcheck=False)
-    scales = np.concatenate([factors.tissot_semimajor, factors.tissot_semiminor])
-    return float(np.abs(scales - 1.0).max()) if np.isfinite(scales).all() else np.inf
+
+def _on_body(crs: CRS, x: Array, y: Array) -> Array:
+    """(3, points): where on the ellipsoid points of a projection lie, metres from its centre."""
+    geodetic, body = crs.geodetic_crs, crs.ellipsoid
+    assert geodetic is not None
+    assert body is not None
+    radians = geodetic.axis_info[0].unit_conversion_factor
+    longitude, latitude = radians * np.asarray(transformer(crs, geodetic).transform(x, y))
+    # Some projections give latitudes beyond the poles for places that they do not reach.
+    reached = np.isfinite(longitude) & (np.abs(latitude) < 0.5 * np.pi + 1e-9)
+    longitude, latitude = np.where(reached, [longitude, latitude], np.nan)
+    a, b = body.semi_major_metre, body.semi_minor_metre
+    across = a**2 / np.hypot(a * np.cos(latitude), b * np.sin(latitude))
+    flat = across * np.cos(latitude)
+    height = (b / a) ** 2 * across * np.sin(latitude)
+    return np.stack([flat * np.cos(longitude), flat * np.sin(longitude), height])
 
 
 def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:

@@ -1,15 +1,18 @@
-"""Layers: the scalar fields over the plane that a surface is made of."""
+"""Layers: the scalar fields over the plane that a surface is made of, and what costs do to it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from .._kernels.surface.surfaces import Peaks, Spline
 from ..errors import InputError
 from ..validation import Array, require_choice, require_not_negative
+from .bounds import Bounds
 
 Kind = Literal["rise", "cost"]
 
@@ -68,3 +71,103 @@ def make_layers(
 def weights_of(layers: Sequence[Layer]) -> Array:
     """(layers,): their weights."""
     return np.array([layer.weight for layer in layers])
+
+
+# Cost layers: what multiplies the length of a way by its level, on the knots of a surface
+
+
+def require_costs(values: Array, x: Array, y: Array, names: Sequence[str]) -> None:
+    """Raise InputError where a cost (layers, ny, nx) is not above 0, naming the place."""
+    bad = np.argwhere(~(values > 0.0))
+    if len(bad):
+        k, j, i = bad[0]
+        raise InputError(
+            f"cost {names[k]!r} is {values[k, j, i]:g} at x1={x[i]:.10g}, x2={y[j]:.10g} and not "
+            f"above 0 in {len(bad)} cells; a cost multiplies lengths, so block what is forbidden "
+            "and give the rest a cost above 0"
+        )
+
+
+# Squares of costs within this are numbers in single precision, too.
+LARGEST_COST = 1e12
+
+
+def require_cost_range(data: Peaks | Spline) -> None:
+    """Raise InputError where the product of all costs is beyond 1e-12 to 1e12."""
+    logs = data.log_cost if isinstance(data, Spline) else np.empty(0)
+    if not logs.size:
+        return
+    low, high, most = float(logs.min()), float(logs.max()), math.log(LARGEST_COST)
+    if not -most <= low <= high <= most:
+        raise InputError(
+            f"the costs, to their weights, reach from 1e{low / math.log(10):.3g} to "
+            f"1e{high / math.log(10):.3g}, beyond {1.0 / LARGEST_COST:g} to {LARGEST_COST:g}; "
+            "scale them, or lower their weights"
+        )
+
+
+def _at_knots(coefficients: Array) -> Array:
+    """Values (layers, ny, nx) of a spline at its knots."""
+    c = (coefficients[:, :-2] + 4.0 * coefficients[:, 1:-1] + coefficients[:, 2:]) / 6.0
+    return np.asarray((c[..., :-2] + 4.0 * c[..., 1:-1] + c[..., 2:]) / 6.0)
+
+
+def limited(logs: Spline) -> Spline:
+    """A spline made to stay, anywhere, between its values at the knots around.
+
+    Costs have sharp edges, where an interpolating spline swings below the least of them and
+    so makes ground cheap that is not. Its coefficients are kept within the values of the 3 x 3
+    nodes around each; on smooth ground off the extremes they are there anyway.
+    """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    values = _at_knots(logs.coefficients)
+    around = np.pad(values, ((0, 0), (1, 1), (1, 1)), mode="edge")
+    low = minimum_filter(around, size=(1, 3, 3), mode="nearest")
+    high = maximum_filter(around, size=(1, 3, 3), mode="nearest")
+    return logs._replace(coefficients=np.clip(logs.coefficients, low, high))
+
+
+def with_costs(data: Spline, logs: Spline | None) -> Spline:
+    """A surface's data under cost layers: the product of each cost to its weight."""
+    if logs is None:
+        return data
+    total = np.tensordot(logs.weights, logs.coefficients, axes=1)
+    return data._replace(
+        log_cost=np.ascontiguousarray(total[None]), floor=math.exp(float(total.min()))
+    )
+
+
+class Span(NamedTuple):
+    """What is sure of a surface inside a rectangle, by its coefficients."""
+
+    least: float  # cost
+    steepest: float  # slope of the cost on the plane, 1/map unit
+    rise: float  # how far apart two points' layers are at most, weighted, map units
+
+
+def span_within(data: Spline, bounds: Bounds) -> Span:
+    """Bounds on the cost and the layers of a surface with costs, inside a rectangle."""
+    rows = _cells(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.log_cost.shape[1])
+    columns = _cells(bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.log_cost.shape[2])
+    logs, layers = data.log_cost[0, rows, columns], data.coefficients[:, rows, columns]
+    slope = math.hypot(
+        float(np.abs(np.diff(logs, axis=1)).max()) / data.dx,
+        float(np.abs(np.diff(logs, axis=0)).max()) / data.dy,
+    )
+    heights = layers.max(axis=(1, 2)) - layers.min(axis=(1, 2))
+    return Span(
+        math.exp(float(logs.min())),
+        slope * math.exp(float(logs.max())),
+        math.hypot(*(data.weights * heights)),
+    )
+
+
+def _cells(low: float, high: float, origin: float, step: float, count: int) -> slice:
+    """The coefficients of an axis that the cells over [low, high] are made of.
+
+    The four from a cell's own number on bound the spline in it.
+    """
+    first = min(max(math.floor((low - origin) / step) - 1, 0), count - 4)
+    last = min(max(math.floor((high - origin) / step) + 1, first), count - 4)
+    return slice(first, last + 4)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pyproj import CRS
@@ -12,12 +12,13 @@ from rasterio import Affine
 
 from ..errors import InputError, MapError
 from ..validation import Array
+from .bounds import Mask
 from .georeference import Georeference
 from .grid import Grid
-from .holes import Cells, continue_into_holes, fill_small_holes, missing_cells
-from .mask import Mask
-from .resampling import resample
 from .surface import Surface
+
+if TYPE_CHECKING:
+    from .holes import Cells
 
 LEAST_CELLS = 4
 
@@ -62,6 +63,8 @@ class Raster:
 
     def to_local_metres(self) -> Raster:
         """The same ground on a north-up grid of square cells in a projected CRS (cubic)."""
+        from .resampling import resample
+
         target = self.grid.planning_grid()
         bands = np.empty((len(self.bands), target.rows, target.columns))
         for band, out in zip(self.bands, bands, strict=True):
@@ -79,6 +82,8 @@ class Raster:
 
     def _missing(self) -> Cells:
         """Cells that any layer has no data in."""
+        from .holes import missing_cells
+
         missing = missing_cells(self.bands[0])
         for band in self.bands[1:]:
             missing |= missing_cells(band)
@@ -93,21 +98,28 @@ class Raster:
             return self
         return Raster.on(self.grid.flipped(), self.bands[:, ::-1])
 
-    def _require_data(self) -> None:
+    @property
+    def is_complete(self) -> bool:
+        """Has each cell of every layer data?"""
+        return all(bool(np.isfinite(band).all()) for band in self.bands)
+
+    def _require_cells(self) -> None:
         rows, columns = self.bands.shape[1:]
         if min(rows, columns) < LEAST_CELLS:
             raise MapError(
                 f"the map has {columns} x {rows} cells; "
                 f"a surface needs at least {LEAST_CELLS} x {LEAST_CELLS}"
             )
-        if self._missing().all():
-            raise MapError("the map holds no data at all: every cell is no-data")
 
-    def _fill(self, size: float, kinds: Sequence[str]) -> Cells:
+    def _fill(self, size: float, kinds: Sequence[str]) -> Mask | None:
         """Fill small holes, continue the ground into large ones; the cells that stay blocked.
 
         Costs are filled by their logarithms and stay within their range, above 0.
         """
+        from .holes import continue_into_holes, fill_small_holes, missing_cells
+
+        if self._missing().all():
+            raise MapError("the map holds no data at all: every cell is no-data")
         blocked = np.zeros(self.bands.shape[1:], dtype=bool)
         for band, kind in zip(self.bands, kinds, strict=True):
             missing = missing_cells(band)
@@ -123,7 +135,7 @@ class Raster:
             if kind == "cost":
                 np.exp(np.clip(band, low, high, out=band), out=band)
             blocked |= missing
-        return blocked
+        return Mask(blocked, *self.grid.centres()) if blocked.any() else None
 
     def to_surface(
         self,
@@ -142,8 +154,9 @@ class Raster:
         The raster is used up: its cells without data are given values.
         """
         raster = self._southward()
-        raster._require_data()
-        blocked = raster._fill(fill_holes, kinds or ["rise"] * len(names))
+        raster._require_cells()
+        kinds = kinds or ["rise"] * len(names)
+        nodata = None if raster.is_complete else raster._fill(fill_holes, kinds)
         x, y = raster.grid.centres()
         try:
             return Surface.from_grid(
@@ -155,7 +168,7 @@ class Raster:
                 units=units,
                 weights=weights,
                 kinds=kinds,
-                nodata=Mask(blocked, x, y) if blocked.any() else None,
+                nodata=nodata,
                 georeference=raster._georeference(),
             )
         except MemoryError:

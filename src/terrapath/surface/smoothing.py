@@ -14,8 +14,6 @@ from .bounds import Bounds
 
 FEATURES_PER_SCALE = 2.0  # a resolution of half a standard deviation, as for Gaussian peaks
 SLOPE_ERROR = 0.01  # rms slope that rounded heights may leave: 1 %, half a degree
-FEWEST_LEVELS = 16  # of distinct heights, from which their step can be told
-MOST_LOOKED_AT = 1_000_000  # heights that the step is sought in
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,10 @@ class Smoothing:
         meter = ChangeMeter(len(before))
         meter.add(after - before)
         return meter.smoothing(scale)
+
+    def resolution(self, spacing: float) -> float:
+        """The size of the smallest features of samples so far apart, map units."""
+        return max(spacing, self.scale / FEATURES_PER_SCALE)
 
     def __str__(self) -> str:
         largest, rms = (
@@ -62,29 +64,6 @@ class ChangeMeter:
         return Smoothing(scale, tuple(self._largest.tolist()), tuple(rms.tolist()))
 
 
-def quantisation_step(values: Array) -> float:
-    """The step that heights are rounded to; 0 where they are not, or it cannot be told.
-
-    values : any shape, NaN where unknown. Found where the gaps between all distinct values are
-    multiples of the smallest, to the precision of 32-bit numbers.
-    """
-    flat = values.reshape(-1)
-    looked_at = flat[:: max(1, flat.size // MOST_LOOKED_AT)]
-    levels = np.unique(looked_at[np.isfinite(looked_at)])
-    if len(levels) < FEWEST_LEVELS:
-        return 0.0
-    rounding = float(np.spacing(np.float32(np.abs(levels).max())))
-    gaps = np.diff(levels)
-    gaps = gaps[gaps > 2.0 * rounding]
-    # Differences that 32-bit numbers can hardly hold are no step that anybody chose.
-    if len(gaps) < FEWEST_LEVELS - 1 or (least := float(gaps.min())) < 8.0 * rounding:
-        return 0.0
-    multiples = np.rint(gaps / least)
-    step = float(gaps.sum() / multiples.sum())
-    off = np.abs(gaps - multiples * step)
-    return step if float(off.max()) <= 2.0 * rounding + 1e-9 * step else 0.0
-
-
 def scale_for_step(step: float, cell: float) -> float:
     """The least smoothing, map units, that heights rounded to a step need; 0 for none.
 
@@ -97,13 +76,11 @@ def scale_for_step(step: float, cell: float) -> float:
     return scale if scale >= 0.5 * cell else 0.0
 
 
-def check_scale(smoothing: float | None, bounds: Bounds) -> float:
-    """The scale of a smoothing, map units; 0 for none.
+def check_scale(smoothing: float, bounds: Bounds) -> float:
+    """The scale of a smoothing, map units.
 
     Raises InputError where it is not finite, below 0 or larger than the map.
     """
-    if smoothing is None:
-        return 0.0
     require_not_negative(smoothing=smoothing)
     side = min(bounds.width, bounds.height)
     if smoothing > side:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,13 +15,21 @@ from .._support.extras import require_packages
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import Array, as_array, as_points, require_not_negative, require_positive
 from .blocks import blocks
-from .bounds import Bounds, as_bounds
-from .costs import limited, require_cost_range, require_costs, with_costs
+from .bounds import Bounds, Mask, as_bounds
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
-from .layers import Layer, make_layers, weights_of
-from .mask import Mask
-from .smoothing import FEATURES_PER_SCALE, Smoothing, check_scale
+from .layers import (
+    Layer,
+    limited,
+    make_layers,
+    require_cost_range,
+    require_costs,
+    weights_of,
+    with_costs,
+)
+
+if TYPE_CHECKING:
+    from .smoothing import Smoothing
 
 
 @dataclass(frozen=True)
@@ -69,6 +77,15 @@ def _steepest(data: Peaks | Spline) -> float:
             return float(slopes.max(initial=0.0))
         slopes = [_steepest_of(layer, data.dx, data.dy) for layer in data.coefficients]
         return float((data.weights * slopes).max())
+
+
+def _scale_of(smoothing: float | None, bounds: Bounds) -> float:
+    """The scale of a smoothing, map units; 0 for none."""
+    if smoothing is None:
+        return 0.0
+    from .smoothing import check_scale
+
+    return check_scale(smoothing, bounds)
 
 
 EXACT = Fit("exact Gaussian peaks", 0.0, 0.0)
@@ -185,7 +202,7 @@ class Surface:
                 "the ground as the first, zeros where it is flat"
             )
         bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
-        scale = check_scale(smoothing, bounds)
+        scale = _scale_of(smoothing, bounds)
         found = fit_grid(array[~is_cost] if costs else array, x, y, weights_of(rises), scale)
         logs = None
         if costs:
@@ -198,8 +215,8 @@ class Surface:
             found.value_error,
             smoothing=found.smoothing,
         )
-        spacing = max(np.diff(x).max(), np.diff(y).max())
-        resolution = float(max(spacing, scale / FEATURES_PER_SCALE))
+        spacing = float(max(np.diff(x).max(), np.diff(y).max()))
+        resolution = spacing if found.smoothing is None else found.smoothing.resolution(spacing)
         data = with_costs(found.spline, logs)
         return cls(data, rises, bounds, fit, resolution, nodata, georeference, costs, logs)
 
@@ -229,7 +246,7 @@ class Surface:
         """
         require_positive(tolerance=tolerance)
         rectangle = as_bounds(bounds)
-        scale = check_scale(smoothing, rectangle)
+        scale = _scale_of(smoothing, rectangle)
         if scale > 0.0:
             found = fit_smoothed(f, rectangle, scale)
         else:

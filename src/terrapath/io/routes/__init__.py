@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 from ..._support.extras import require_packages
@@ -11,35 +12,35 @@ from ..._support.files import BAG_ENDING, folder_written_whole, written_whole
 from ...errors import MapError
 from ...problem import Solution
 from ...surface.georeference import Georeference
-from . import geojson, geopackage, gpx, ros, table
-from .record import provenance, route_record, write_json
 
 __all__ = [
     "WRITERS",
-    "provenance",
     "require_fitting_format",
     "require_known_format",
-    "route_record",
     "write_route",
 ]
 
 
 class Writer(NamedTuple):
-    """How a format is written, and by which packages of the extras."""
+    """Where a format is written, and by which packages of the extras."""
 
-    # Takes a solution that has a path, and a file that exists already, empty.
-    write: Callable[[Solution, Path], None]
+    # The module's ``write`` takes a solution that has a path, and a file that exists, empty.
+    module: str
     packages: tuple[str, ...] = ()
 
 
 WRITERS = {
-    ".geojson": Writer(geojson.write),
-    ".gpkg": Writer(geopackage.write, ("geopandas", "pyogrio")),
-    ".gpx": Writer(gpx.write, ("gpxpy",)),
-    ".csv": Writer(table.write),
-    ".json": Writer(write_json),
-    BAG_ENDING: Writer(ros.write, ("rosbags",)),
+    ".geojson": Writer("geojson"),
+    ".gpkg": Writer("geopackage", ("pyogrio",)),
+    ".gpx": Writer("gpx", ("gpxpy",)),
+    ".csv": Writer("table"),
+    ".json": Writer("record"),
+    BAG_ENDING: Writer("ros", ("rosbags",)),
 }
+
+
+def _writer(ending: str) -> ModuleType:
+    return import_module(f".{WRITERS[ending].module}", __name__)
 
 
 def require_known_format(path: Path) -> None:
@@ -54,7 +55,7 @@ def require_fitting_format(path: Path, georeference: Georeference | None) -> Non
     """Raise MapError where a route on this plane has no place in the format (GPX off Earth)."""
     require_known_format(path)
     if path.suffix.lower() == ".gpx":
-        gpx.require_earth(path, georeference)
+        _writer(".gpx").require_earth(path, georeference)
 
 
 def write_route(solution: Solution, path: str | Path) -> None:
@@ -70,4 +71,4 @@ def write_route(solution: Solution, path: str | Path) -> None:
     ending = target.suffix.lower()
     whole = folder_written_whole if ending == BAG_ENDING else written_whole
     with whole(target) as temporary:
-        WRITERS[ending].write(solution, temporary)
+        _writer(ending).write(solution, temporary)

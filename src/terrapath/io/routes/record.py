@@ -155,6 +155,6 @@ def summary(solution: Solution) -> dict[str, Any]:
     return dict(plain({**_measures(solution), **provenance(solution)}))
 
 
-def write_json(solution: Solution, file: Path) -> None:
+def write(solution: Solution, file: Path) -> None:
     """The record."""
     file.write_text(dump(route_record(solution)), encoding="utf-8")

@@ -8,9 +8,10 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from ..._support.telling import tell
 from ...errors import MapError
 from ...surface.bounds import Bounds
-from .layers import VectorWarning, read_layers, tell
+from .layers import VectorWarning, read_layers
 from .plane import Plane, Where, placed
 
 
@@ -64,9 +65,8 @@ def _tell_of_outsiders(
     shapely.prepare(frame)
     inside = int(shapely.intersects(frame, np.array(shapes, np.object_)).sum())
     if inside == 0:
-        tell(
-            VectorWarning,
-            f"{source}: all obstacles lie outside the map; check the file's CRS and its axis order",
-        )
+        told = "all obstacles lie outside the map; check the file's CRS and its axis order"
+        tell(VectorWarning(f"{source}: {told}"))
     elif inside < count:
-        tell(VectorWarning, f"{source}: {count - inside} of {count} obstacles lie outside the map")
+        told = f"{count - inside} of {count} obstacles lie outside the map"
+        tell(VectorWarning(f"{source}: {told}"))

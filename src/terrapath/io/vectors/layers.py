@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from pyproj.exceptions import CRSError
 from shapely.geometry.base import BaseGeometry
 
 from ..._support.extras import require_packages
+from ..._support.telling import silence, tell
 from ...errors import MapError, TerrapathWarning
 from ...space.free_space import Geometries, Indices, simple_parts
 
@@ -29,13 +30,6 @@ class VectorWarning(TerrapathWarning):
 
 class RepairedWarning(VectorWarning):
     """Geometries of a vector file were not valid, and have been repaired."""
-
-
-def tell(category: type[TerrapathWarning], text: str) -> None:
-    """Warn, at the caller."""
-    from ...errors import tell as say
-
-    say(category(text))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,25 +99,21 @@ def _refuse_absurd_sizes(path: Path) -> None:
         )
 
 
-class quietly:  # noqa: N801 -- reads as a verb
-    """GDAL's complaints become one MapError, its warnings are not shown."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.caught = warnings.catch_warnings()
-
-    def __enter__(self) -> None:
-        self.caught.__enter__()
-        warnings.simplefilter("ignore")
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        self.caught.__exit__(kind, error, trace)
-        # Of a foreign file, drivers raise whatever they do.
-        if isinstance(error, Exception) and not isinstance(error, MapError):
-            raise MapError(
-                f"{self.path} cannot be read as vectors: {reason_of(error)}; check that it is a "
-                "vector file, and whole"
-            ) from None
+@contextmanager
+def quietly(path: Path) -> Iterator[None]:
+    """GDAL's and GEOS's complaints become one MapError, their warnings are not shown."""
+    for module in ("pyogrio.core", "pyogrio.raw"):
+        silence(RuntimeWarning, module)
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except MapError:
+        raise
+    except Exception as error:  # of a foreign file, drivers raise whatever they do
+        raise MapError(
+            f"{path} cannot be read as vectors: {reason_of(error)}; check that it is a "
+            "vector file, and whole"
+        ) from None
 
 
 def reason_of(error: Exception) -> str:
@@ -151,11 +141,8 @@ def _read_layer(path: Path, name: str, *, alone: bool) -> Layer | None:
         return None
     if missing.any():
         count = int(missing.sum())
-        tell(
-            VectorWarning,
-            f"{label}: without geometry and left out: {count} of {len(shapes)} features, the "
-            f"first is feature {ids[missing][0]}",
-        )
+        told = f"{label}: without geometry and left out: {count} of {len(shapes)} features"
+        tell(VectorWarning(f"{told}, the first is feature {ids[missing][0]}"))
     layer = Layer(label, driver, crs, shapes[~missing], ids[~missing])
     require_places(layer, "a coordinate that is not finite, or on no map; mend or remove it")
     return layer
@@ -188,11 +175,8 @@ def repaired(layer: Layer) -> Layer:
         mended = shapely.make_valid(layer.shapes[broken], method="structure", keep_collapsed=True)
     shapes = layer.shapes.copy()
     shapes[broken] = [with_extent(shape) for shape in mended]
-    tell(
-        RepairedWarning,
-        f"{layer.label}: not valid, and repaired: {len(broken)} of {len(shapes)} geometries, the "
-        f"first is feature {layer.numbers[broken[0]]}: {reason}",
-    )
+    told = f"{layer.label}: not valid, and repaired: {len(broken)} of {len(shapes)} geometries"
+    tell(RepairedWarning(f"{told}, the first is feature {layer.numbers[broken[0]]}: {reason}"))
     kept = ~shapely.is_empty(shapes)
     return replace(layer, shapes=shapes[kept], numbers=layer.numbers[kept])
 

@@ -13,6 +13,7 @@ from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 from shapely.geometry.base import BaseGeometry
 
+from ..._support.telling import tell
 from ...errors import InputError, MapError
 from ...space.free_space import POINTS, Geometries, outlines, simple_parts
 from ...surface import Surface
@@ -26,7 +27,6 @@ from .layers import (
     reason_of,
     repaired,
     require_places,
-    tell,
     with_extent,
 )
 
@@ -76,18 +76,12 @@ class Plane:
         crs = layer.crs
         if crs is None:
             crs = reference.map_crs
-            tell(
-                VectorWarning,
-                f"{layer.label} has no CRS and is taken to be in the map's own coordinates, "
-                f"{crs.name}",
-            )
+            told = f"{layer.label} has no CRS and is taken to be in the map's own coordinates"
+            tell(VectorWarning(f"{told}, {crs.name}"))
         elif layer.driver in EARTHLY_FORMATS and not reference.is_earth and _is_wgs84(crs):
             crs = reference.crs.geodetic_crs or reference.map_crs
-            tell(
-                VectorWarning,
-                f"{layer.label} cannot name another body than Earth and is taken as longitude "
-                f"and latitude of {crs.name}",
-            )
+            told = f"{layer.label} cannot name another body than Earth"
+            tell(VectorWarning(f"{told} and is taken as longitude and latitude of {crs.name}"))
         return None if crs == reference.crs else crs
 
 

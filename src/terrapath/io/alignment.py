@@ -1,0 +1,99 @@
+"""Further layers brought onto the grid of the heights."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from pyproj import CRS
+
+from ..errors import MapError
+from ..surface.blocks import blocks
+from ..surface.grid import Grid
+from ..surface.resampling import require_overlap, resample
+from ..validation import Array
+from .bands import Band, Part, View
+
+
+def placed(name: str, band: Band, base: Grid, crs: CRS | None) -> Band:
+    """A layer with a CRS, the given one or that of the heights whose cells it has."""
+    grid = band.grid
+    if grid.crs is None and crs is not None:
+        return replace(band, grid=replace(grid, crs=crs))
+    if grid.crs is not None and base.crs is not None:
+        return band
+    if not _has_cells_of(grid, base):
+        raise MapError(
+            f"layer {name!r} lies on another grid than the heights and at least one of them has "
+            "no CRS, so they cannot be brought together; assign it, as in crs='EPSG:32633'"
+        )
+    return replace(band, grid=replace(grid, crs=base.crs))
+
+
+def _has_cells_of(grid: Grid, other: Grid) -> bool:
+    return grid.is_same(other) or grid.flipped().is_same(other)
+
+
+def read_all(parts: Sequence[Part], base: View, target: Grid, most_cells: int) -> Array:
+    """All layers (layers, rows, columns) on the cells of the target.
+
+    The first are the heights, of which ``base`` is seen. most_cells : a layer that needs more is
+    refused before memory is taken.
+    """
+    views = [base, *(_view_onto(part, base, target) for part in parts[1:])]
+    for view in views:
+        view.require_size(most_cells)
+    bands = np.empty((len(parts), target.rows, target.columns))
+    for part, view, out in zip(parts, views, bands, strict=True):
+        if part.kind == "cost":
+            _costs_onto(part.name, view, target, out)
+        elif not view.read_as(target, out):
+            resample(_read(view), view.grid, target, out, linear=False)
+    return bands
+
+
+def _view_onto(part: Part, base: View, target: Grid) -> View:
+    """What the map needs of a layer, no finer than the map."""
+    grid = part.band.grid
+    if grid.crs == base.band.grid.crs and grid.is_same(base.band.grid):
+        return replace(base, band=part.band)
+    require_overlap(f"layer {part.name!r} ({part.band.label})", grid, target)
+    x, y = target.outline(grid.crs)
+    if grid.crs is not None and grid.crs.is_geographic:
+        west, _, east, _ = grid.extent()
+        x = x + 360.0 * np.rint((0.5 * (west + east) - x) / 360.0)
+    column, row = grid.cells(x, y)
+    ratio = max(float(np.ptp(column)) / target.columns, float(np.ptp(row)) / target.rows)
+    view = View.whole(part.band).coarser(max(1, math.floor(ratio + 0.01)))
+    return view.around(x, y) or view
+
+
+def _costs_onto(name: str, view: View, target: Grid, out: Array) -> None:
+    """Costs on the target's cells, within the range that they have: logarithms, bilinear."""
+    values = _read(view)
+    _require_costs(name, values, view.grid)
+    np.log(values, out=values)
+    resample(values, view.grid, target, out, linear=True)
+    np.exp(out, out=out)
+
+
+def _read(view: View) -> Array:
+    values = np.empty((view.grid.rows, view.grid.columns))
+    view.read_into(values)
+    return values
+
+
+def _require_costs(name: str, values: Array, grid: Grid) -> None:
+    """Raise MapError with the place of a cost that is not above 0."""
+    for rows in blocks(grid.rows, grid.columns):
+        wrong = np.argwhere(values[rows] <= 0.0)
+        if len(wrong):
+            row, column = wrong[0]
+            x, y = grid.place(column + 0.5, rows.start + row + 0.5)
+            raise MapError(
+                f"cost {name!r} is {values[rows.start + row, column]:g} at x={x:.10g}, "
+                f"y={y:.10g}; costs multiply lengths and must be above 0: mark forbidden ground as "
+                "no-data, and raise the rest"
+            )
