@@ -66,7 +66,7 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
     unit = problem.surface.unit
     yield "true length", _amount(length, unit)
     if solution.lower_bound is not None and solution.gap is not None:
-        yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bounded}"
+        yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bound_in_words}"
         yield "gap", _gap(solution.gap, target_gap)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)

@@ -9,7 +9,15 @@ from ..distance.field import DistanceField, Medium, march_from
 from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..validation import require_positive
-from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
+from .base import (
+    INTERRUPT,
+    Callback,
+    Progress,
+    Stopper,
+    answer_without_search,
+    lattices,
+    least_limit,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,19 +44,29 @@ class FastMarching:
         """The planner's name on the command line."""
         return "fast-marching"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
+        """Plan. ``callback`` sees the progress and stops the planner by returning True.
+
+        time_limit : seconds for this call; the lower of it and the option counts.
+        """
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
-        return _Run(self, problem, callback).solve()
+        stopper = Stopper(callback, least_limit(self.time_limit, time_limit))
+        return _Run(self, problem, stopper).solve()
 
 
 class _Run:
     """One run, and how far it came."""
 
-    def __init__(self, planner: FastMarching, problem: Problem, callback: Callback | None) -> None:
+    def __init__(self, planner: FastMarching, problem: Problem, stopper: Stopper) -> None:
         self.planner, self.problem = planner, problem
-        self.stopper = Stopper(callback, planner.time_limit)
+        self.stopper = stopper
         self.settled, self.total = 0, 0
 
     def solve(self) -> Solution:

@@ -23,7 +23,7 @@ from ..geodesics.rays import (
 )
 from ..problem import Path, Problem, Solution, Status
 from ..validation import Array, as_point, require_count, require_positive
-from .base import Callback, Progress, answer_without_search
+from .base import Callback, Progress, Stopper, answer_without_search, least_limit
 
 # 0.5 in the paper's region of 12 x 12: rays that pass this share of its side from the goal.
 NEAR_SHARE = 1.0 / 24.0
@@ -138,12 +138,19 @@ class GeodesicTraversal:
             tolerance=self.tolerance,
         )
 
-    def fan(self, problem: Problem, *, callback: Callback | None = None) -> Fan:
+    def fan(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Fan:
         """Trace all rays, and find the geodesic between two of them as soon as both are there.
 
-        A callback that returns True, or Ctrl-C, leaves the fan with what it has.
+        A callback that returns True, the time limit (seconds) and Ctrl-C leave the fan with
+        what it has.
         """
-        started = time.perf_counter()
+        stopper = Stopper(callback, least_limit(None, time_limit))
         misses: list[Miss] = []
         found: list[Geodesic] = []
         interrupted = False
@@ -151,10 +158,9 @@ class GeodesicTraversal:
             for angle in self._angles(problem):
                 misses.append(closest_approach(self._trace(problem, float(angle)), problem.goal))
                 found += self._hits(problem, misses[-2:])
-                seconds = time.perf_counter() - started
                 best = min((geodesic.length for geodesic in found), default=math.inf)
-                report = Progress(len(misses), self.directions, seconds, best)
-                if callback is not None and callback(report):
+                seconds = stopper.seconds
+                if stopper.must_stop(Progress(len(misses), self.directions, seconds, best)):
                     break
         except KeyboardInterrupt:
             interrupted = True
@@ -175,13 +181,23 @@ class GeodesicTraversal:
         )
         return [geodesic] if geodesic is not None and _is_free(problem, geodesic) else []
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """The shortest geodesic of the fan, its path sampled; ``cost`` is its exact length."""
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
+        """The shortest geodesic of the fan, its path sampled; ``cost`` is its exact length.
+
+        ``callback`` sees the progress and stops the planner by returning True. time_limit :
+        seconds for this call.
+        """
         answer = answer_without_search(problem, self.name)
         if answer is not None:
             return answer
         started = time.perf_counter()
-        fan = self.fan(problem, callback=callback)
+        fan = self.fan(problem, callback=callback, time_limit=time_limit)
         paths = tuple(_path(problem, geodesic) for geodesic in fan.geodesics)
         status = Status.SOLVED if paths else Status.NOT_FOUND
         return Solution(

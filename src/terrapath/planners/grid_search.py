@@ -16,7 +16,7 @@ from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, answer_without_search
+from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit
 from .tree_search import FEATURES_PER_PANEL
 
 # Vertices settled between two looks at the clock, the callback and Ctrl-C.
@@ -70,13 +70,21 @@ class Dijkstra:
         """Is the search drawn towards the goal?"""
         return False
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
         """Plan. ``callback`` sees the progress and stops the planner by returning True.
 
+        time_limit : seconds for this call; the lower of it and the option counts.
         Ctrl-C, too, ends the search, with the best path so far. ``samples`` are the vertices
         settled. Raises InputError where the spacing makes more nodes than can be numbered.
         """
-        return _search_grid(problem, self, callback)
+        limit = least_limit(self.time_limit, time_limit)
+        return _search_grid(problem, self, callback, limit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,6 +132,7 @@ class _Search:
     nodes: kernels.Nodes
     graph: kernels.Graph
     options: kernels.Options
+    time_limit: float | None  # seconds
     started: float = field(default_factory=time.perf_counter)
 
     @property
@@ -189,7 +198,7 @@ def _allocate(lattice: Lattice, surface: Surface) -> kernels.Graph:
         ) from None
 
 
-def _prepare(problem: Problem, planner: Dijkstra) -> _Search:
+def _prepare(problem: Problem, planner: Dijkstra, time_limit: float | None) -> _Search:
     """Open the start, and have the kernels loaded, or compiled, before the clock starts."""
     lattice = Lattice.spanning(problem.bounds, planner.spacing or problem.default_spacing)
     nodes = kernels.Nodes(
@@ -206,7 +215,7 @@ def _prepare(problem: Problem, planner: Dijkstra) -> _Search:
         informed=planner.informed,
         direct=cells_apart <= REACH[planner.neighbours],
     )
-    search = _Search(problem, planner, lattice, nodes, graph, options)
+    search = _Search(problem, planner, lattice, nodes, graph, options, time_limit)
     kernels.begin(problem.surface.data, graph, options, *problem.start, *problem.goal)
     search.advance(0)
     search.sees_a_node(problem.start, NO_NODES)
@@ -224,7 +233,7 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
         return "no way on from the nodes reached"
     if stopped:
         return "callback"
-    limit = search.planner.time_limit
+    limit = search.time_limit
     return "time limit" if limit is not None and progress.seconds >= limit else ""
 
 
@@ -279,12 +288,14 @@ def _counters(graph: kernels.Graph) -> dict[str, int]:
     return {name: int(graph.counters[place]) for name, place in places.items()}
 
 
-def _search_grid(problem: Problem, planner: Dijkstra, callback: Callback | None) -> Solution:
-    """Search from the start until the goal is settled or the planner or callback say stop."""
+def _search_grid(
+    problem: Problem, planner: Dijkstra, callback: Callback | None, time_limit: float | None
+) -> Solution:
+    """Search from the start until the goal is settled, time is up, or the callback says stop."""
     answer = answer_without_search(problem, planner.name)
     if answer is not None:
         return answer
-    search = _prepare(problem, planner)
+    search = _prepare(problem, planner, time_limit)
     stopped_by = _run(search, callback)
     seconds = search.seconds
     path = _path(search)

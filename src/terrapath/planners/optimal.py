@@ -10,8 +10,16 @@ from ..errors import warn_unfinished
 from ..geodesics.alternatives import routes_of_fields, shortest
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
-from .finished import bounded
+from .base import (
+    INTERRUPT,
+    Callback,
+    Progress,
+    Stopper,
+    answer_without_search,
+    lattices,
+    least_limit,
+)
+from .finished import with_bound
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,22 +51,30 @@ class Optimal:
         """The planner's name on the command line."""
         return "optimal"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
         """Plan. ``callback`` sees the progress and stops the planner by returning True.
 
+        time_limit : seconds for this call; the lower of it and the option counts.
         Ctrl-C, too, ends the search, with the best path and the best bound so far.
         """
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
-        return _Run(self, problem, callback).solve()
+        stopper = Stopper(callback, least_limit(self.time_limit, time_limit))
+        return _Run(self, problem, stopper).solve()
 
 
 class _Run:
     """One run, and what was found so far."""
 
-    def __init__(self, planner: Optimal, problem: Problem, callback: Callback | None) -> None:
+    def __init__(self, planner: Optimal, problem: Problem, stopper: Stopper) -> None:
         self.planner, self.problem = planner, problem
-        self.stopper = Stopper(callback, planner.time_limit)
+        self.stopper = stopper
         self.samples, self.total = 0, 0
         self.direct: Path | None = None
         self.routes: tuple[Path, ...] = ()
@@ -77,7 +93,7 @@ class _Run:
         if solution.path is None or self.stopper.stopped_by:
             return solution
         target = self.planner.target_gap
-        solution = bounded(solution, target_gap=target, callback=self.stopper.must_stop)
+        solution = with_bound(solution, target_gap=target, callback=self.stopper.must_stop)
         if solution.status is Status.INTERRUPTED:
             return solution
         met = solution.gap is not None and solution.gap <= target

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..problem import Problem, Solution
 from ..validation import require_count, require_fraction, require_positive, require_seed
-from .base import Callback
+from .base import Callback, least_limit
 from .tree_search import TreeOptions, search_tree
 
 
@@ -41,8 +41,17 @@ class RRT:
         """The planner's name on the command line."""
         return "rrt"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
+        """Plan. ``callback`` sees the progress and stops the planner by returning True.
+
+        time_limit : seconds for this call; the lower of it and the option counts.
+        """
         options = TreeOptions(
             planner=self.name,
             samples=int(self.samples),
@@ -53,7 +62,7 @@ class RRT:
             riemannian=True,
             prune=True,
             informed=False,
-            time_limit=self.time_limit,
+            time_limit=least_limit(self.time_limit, time_limit),
             target_length=math.inf,
         )
         return search_tree(problem, options, callback)

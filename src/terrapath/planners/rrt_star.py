@@ -14,7 +14,7 @@ from ..validation import (
     require_positive,
     require_seed,
 )
-from .base import Callback
+from .base import Callback, least_limit
 from .tree_search import TreeOptions, search_tree
 
 
@@ -74,14 +74,21 @@ class RRTStar:
         """The planner's name on the command line."""
         return "rrt-star-r" if self.metric == "riemannian" else "rrt-star"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
         """Plan. ``callback`` sees the progress and stops the planner by returning True.
 
+        time_limit : seconds for this call; the lower of it and the option counts.
         Ctrl-C, too, ends the search with the best path so far.
         """
-        return search_tree(problem, self._tree_options(), callback)
+        return search_tree(problem, self._tree_options(time_limit), callback)
 
-    def _tree_options(self) -> TreeOptions:
+    def _tree_options(self, time_limit: float | None = None) -> TreeOptions:
         return TreeOptions(
             planner=self.name,
             samples=int(self.samples),
@@ -93,6 +100,6 @@ class RRTStar:
             prune=self.prune,
             informed=self.informed,
             panel=self.panel,
-            time_limit=self.time_limit,
+            time_limit=least_limit(self.time_limit, time_limit),
             target_length=self.target_length or 0.0,
         )

@@ -42,7 +42,7 @@ def _title(solution: Solution) -> str:
         return title
     bound = format_length(solution.lower_bound, unit)
     gap = f"{100.0 * solution.gap:.3g} %"
-    return f"{title}\nproven: {solution.bounded} than {bound}, a gap of {gap}"
+    return f"{title}\nproven: {solution.bound_in_words} than {bound}, a gap of {gap}"
 
 
 def draw_route(solution: Solution) -> Any:

@@ -270,7 +270,7 @@ def _title(solution: Solution) -> str:
     if solution.lower_bound is None or solution.gap is None:
         return text
     bound = format_length(solution.lower_bound, unit)
-    return f"{text}; {solution.bounded} than {bound}, a gap of {100.0 * solution.gap:.3g} %"
+    return f"{text}; {solution.bound_in_words} than {bound}, a gap of {100.0 * solution.gap:.3g} %"
 
 
 def _axis_title(name: str, unit: str, origin: float) -> dict[str, str]:

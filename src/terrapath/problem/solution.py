@@ -123,8 +123,8 @@ class Solution:
         return self.stops[1:-1] if self.path is not None else np.empty((0, 2))
 
     @property
-    def bounded(self) -> str:
-        """What the lower bound speaks of, in words: "no path is shorter"."""
+    def bound_in_words(self) -> str:
+        """What the lower bound says, in words, such as "no path is shorter"."""
         which = " through these points" if self.legs else ""
         where = "" if self.corridor is None else " in the corridor"
         return f"no path{which}{where} is shorter"
