@@ -157,15 +157,15 @@ def _doubt(surface: Any) -> float:
     return EPSILONS * float(np.finfo(np.float64).eps) * math.hypot(*(sizes * surface.weights))
 
 
-def _bound(problem: Problem, claim: Claim) -> kernels.Bound:
+def _potential(problem: Problem, claim: Claim) -> kernels.Potential:
     """The function u, the start being the origin."""
     (x, y), lattice = problem.start, claim.lattice
     corner_x, corner_y = lattice.bounds.x1_min - x, lattice.bounds.x2_min - y
-    return kernels.Bound(claim.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
+    return kernels.Potential(claim.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
 
 
 def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
-    """Room for the pieces that a cell is cut into at the surface's knots."""
+    """Workspace for the pieces that a cell is cut into at the surface's knots."""
     data: Any = problem.surface.data
     step = min(data.dx, data.dy) if hasattr(data, "dx") else math.inf
     return kernels.Cutting(
@@ -204,7 +204,7 @@ def cell_needs(problem: Problem, claim: Claim, enough: float) -> Needs:
     found, likely, slope = np.empty((3, lattice.ny - 1, lattice.nx - 1))
     kernels.fill_needs(
         ground.surface,
-        _bound(problem, claim),
+        _potential(problem, claim),
         ground.goal,
         float(claim.horizon),
         exempt_cells(problem, claim),
@@ -225,7 +225,7 @@ def proven_norm(problem: Problem, claim: Claim, found: Array, enough: float = 0.
     ground = _ground(problem)
     norm = kernels.least_norm(
         ground.surface,
-        _bound(problem, claim),
+        _potential(problem, claim),
         ground.goal,
         float(claim.horizon),
         np.argsort(found, axis=None)[::-1],
@@ -281,7 +281,7 @@ def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> floa
     core, anchor = end.core, _anchor(problem, claim, end)
     margin = kernels.margin_of_core(
         _ground(problem).surface,
-        _bound(problem, claim),
+        _potential(problem, claim),
         anchor,
         float(factor),
         core.column0,

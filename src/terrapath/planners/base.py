@@ -12,6 +12,9 @@ from ..problem import Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..validation import require_positive
 
+# A map with more cells is planned on coarse to fine, in a corridor.
+MOST_CELLS = 16_000_000
+
 # Why a search was not needed: it is proven that there is no path.
 SEPARATED = "start and goal lie in different parts of the free space"
 

@@ -21,8 +21,6 @@ from ..validation import Array, require_positive
 from . import FastMarching, Finished, plan_tour
 from .base import Callback, Planner, Progress
 
-# A map with more cells than that is planned on coarse to fine.
-MOST_CELLS = 16_000_000
 # It is read about so coarse at first.
 COARSE_CELLS = 1_000_000
 # Of the corridor's window no more cells are read; a larger one is read coarser.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,11 +13,13 @@ from ..errors import BlockedError, InputError, OutsideSurfaceError
 from ..space.constraints import Constraints, outside_of
 from ..space.free_space import Obstacle
 from ..space.lattice import default_spacing
-from ..space.slope_limit import Steepness
 from ..surface import Surface, metric
 from ..surface.bounds import Bounds, as_bounds
 from ..validation import as_point, require_not_negative
 from .path import Path
+
+if TYPE_CHECKING:
+    from ..space.slope_limit import SlopeLimit
 
 
 class Problem:
@@ -63,19 +65,31 @@ class Problem:
         self.radius = float(radius)
         self.max_slope = max_slope
         self.keep_in = keep_in
-        # Ground beyond the bounds keeps the vehicle off, too.
-        around = self.bounds.widened(self.radius)
-        self.constraints = Constraints(
-            bounds=self.bounds,
-            obstacles=given,
-            nodata=surface.nodata,
-            steepness=None if max_slope is None else Steepness(surface, max_slope, around),
-            outside=None if keep_in is None else outside_of(keep_in, self.bounds, self.radius),
-            radius=self.radius,
-        )
+        self.constraints = self._constraints()
         self.free_space = self.constraints.free_space()
         self.start = self._check("start", start)
         self.goal = self._check("goal", goal)
+
+    def _constraints(self) -> Constraints:
+        outside = None
+        if self.keep_in is not None:
+            outside = outside_of(self.keep_in, self.bounds, self.radius)
+        return Constraints(
+            bounds=self.bounds,
+            obstacles=self.obstacles,
+            nodata=self.surface.nodata,
+            slope_limit=self._slope_limit(),
+            outside=outside,
+            radius=self.radius,
+        )
+
+    def _slope_limit(self) -> SlopeLimit | None:
+        if self.max_slope is None:
+            return None
+        from ..space.slope_limit import SlopeLimit
+
+        # Ground beyond the bounds keeps the vehicle off, too.
+        return SlopeLimit(self.surface, self.max_slope, self.bounds.widened(self.radius))
 
     @staticmethod
     def _make_bounds(surface: Surface, bounds: Any) -> Bounds:

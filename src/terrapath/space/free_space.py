@@ -18,7 +18,6 @@ from ..surface import Mask
 from ..surface.bounds import Bounds
 from ..validation import Array, as_array, as_point, require_positive
 from .lattice import Lattice
-from .reachability import separated
 
 # Around two edges or circles a cell keeps the lists short and the index small.
 ITEMS_PER_CELL = 2.0
@@ -58,6 +57,11 @@ Geometries: TypeAlias = npt.NDArray[np.object_]
 
 POINTS = (0, 4)  # shapely's type ids
 POLYGON = 3
+
+
+def are_points(geometries: Geometries) -> npt.NDArray[np.bool_]:
+    """(m,), which geometries are points, or several of them."""
+    return np.isin(shapely.get_type_id(geometries), POINTS)
 
 
 class Parts(NamedTuple):
@@ -106,7 +110,7 @@ def simple_parts(geometries: Geometries, owners: Indices) -> tuple[Geometries, I
 
 
 def _refuse_points(parts: Parts) -> None:
-    without_width = np.isin(shapely.get_type_id(parts.geometries), POINTS)
+    without_width = are_points(parts.geometries)
     if without_width.any():
         raise InputError(
             f"obstacles[{parts.owners[without_width][0]}] holds a Point, which has no width to "
@@ -249,6 +253,10 @@ class FreeSpace:
         for name, point in (("a", as_point(a, "a")), ("b", as_point(b, "b"))):
             if blocker := self.blocker(point):
                 raise InputError(f"{name}=({point[0]:.10g}, {point[1]:.10g}) is {blocker}")
+        if not self.has_obstacles:
+            return False
+        from .reachability import separated
+
         discs = np.array([circle.inscribed for circle in self.circles], np.object_)
         walls, _ = outlines(np.concatenate([self._geometries, discs]))
         return separated(self.bounds, self.data, self.masks, walls, a, b)

@@ -29,7 +29,7 @@ REACH = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Steepness:
+class SlopeLimit:
     """The cells of a surface on which its height rises by more than ``max_slope`` degrees.
 
     The surface's cells are those around the knots of its spline, which for a map are the map's

@@ -14,7 +14,6 @@ from ...surface import Surface
 from ...validation import Array, as_array, require_positive
 from .newton import shortest_polyline
 from .smooth import correct, curve_through, laid_shares
-from .taut import taut_paths
 
 __all__ = ["refine", "shortest_polyline"]
 
@@ -106,6 +105,8 @@ def _refined(problem: Problem, given: Path, tolerance: float) -> Iterator[Array]
         if all(problem.bounds.contains(points).all() for points in candidates):
             yield from candidates
             return
+    from .taut import taut_paths
+
     yield from taut_paths(problem, given.points, tolerance)
 
 

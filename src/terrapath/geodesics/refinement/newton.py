@@ -79,9 +79,9 @@ def newton_step(strand: kernels.Strand, projectors: Array, curvature: float = 1.
     step that always leads down.
     """
     count = len(projectors)
-    room = kernels.Room(*np.empty((2, count, 2)), *np.empty((2, count, 2, 2)))
-    definite = kernels.newton_step(strand, projectors, curvature, room)
-    return Step(definite, 2.0 * (count + 1) * room.derivative, room.move)
+    space = kernels.Workspace(*np.empty((2, count, 2)), *np.empty((2, count, 2, 2)))
+    definite = kernels.newton_step(strand, projectors, curvature, space)
+    return Step(definite, 2.0 * (count + 1) * space.derivative, space.move)
 
 
 def _descent_step(path: Lifted, projectors: Array) -> Step:
