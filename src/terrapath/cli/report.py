@@ -114,7 +114,7 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     if corridor is None:
         return
     around = _amount(corridor.half_width, unit)
-    coarse = _amount(corridor.coarse.length, unit)
+    coarse = _amount(corridor.coarse_length, unit)
     yield (
         "corridor",
         f"{around} on both sides of a route of {coarse}, planned on the map read "

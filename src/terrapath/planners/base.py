@@ -125,7 +125,7 @@ def solve_within(
 ) -> Solution:
     """What a planner answers within a time limit, seconds.
 
-    Where there is no limit the planner is not told of one, so planners that know none work, too.
+    Without a limit the argument is left out, so that planners that do not take it work, too.
     """
     if time_limit is None:
         return planner.solve(problem, callback=callback)

@@ -1,4 +1,4 @@
-"""The paper's ground truth: a fan of geodesics, and the ones that really hit the goal."""
+"""The paper's ground truth: a fan of geodesics, and those that end exactly at the goal."""
 
 from __future__ import annotations
 
@@ -25,23 +25,25 @@ from ..problem import Path, Problem, Solution, Status
 from ..validation import Array, as_point, require_count, require_positive
 from .base import Callback, Progress, Stopper, answer_without_search, least_limit
 
-# 0.5 in the paper's region of 12 x 12: rays that pass this share of its side from the goal.
+# Rays that pass the goal within this share of the region's side are near it: 0.5 in the paper's
+# region of 12 x 12.
 NEAR_SHARE = 1.0 / 24.0
 
-# No geodesic longer than the straight way is the shortest; a little more finds those over it.
+# Rays are as long as this many times the straight line on the surface. The shortest geodesic is no
+# longer than that line; the rest is a margin.
 LONGEST_SHARE = 1.05
 
-# Steps of a ray at least so many to the region's side, so that no approach is overlooked.
+# A ray's steps are at most the region's side over this, so that no close approach is missed.
 STEPS_PER_SIDE = 40.0
 
 
 @dataclass(frozen=True, eq=False)
 class Fan:
-    """All rays of a traversal and what they found.
+    """All rays of a traversal, and what they found.
 
-    angles : (n,), radians. closest : (n,), planar distance of each ray's closest approach to
-    the goal, map units. near : (n,), which of them come within the radius. geodesics : those
-    found that end exactly at the goal, shortest first.
+    misses : where each ray comes closest to the goal. radius : rays that come within it are near
+    the goal, map units. geodesics : those found that end exactly at the goal, shortest first.
+    interrupted : by Ctrl-C, before all rays were traced.
     """
 
     rays: tuple[Ray, ...]
@@ -75,21 +77,22 @@ class Fan:
 
     @property
     def paper_length(self) -> float | None:
-        """Its length up to where it is closest to the goal, map units."""
+        """The length of that ray, up to where it is closest to the goal, map units."""
         return None if self.paper_ray is None else self.misses[self.paper_ray].arc_length
 
 
 @dataclass(frozen=True, kw_only=True)
 class GeodesicTraversal:
-    """Rays in many directions, the paper's way to the shortest path; then exactly.
+    """Rays in many directions, as the paper does, and from them the exact geodesics to the goal.
 
     directions : how many rays. sector : (first, last) angle, radians; by default 45 degrees to
-    either side of the goal, [0, pi/2] in the paper. radius : which rays count as near the
-    goal, map units; by default a 24th of the region's side, 0.5 in the paper. tolerance : of
-    the integrator's error in each step.
+    either side of the goal, [0, pi/2] in the paper. radius : rays that come within it are near
+    the goal, map units; by default a 24th of the region's side, 0.5 in the paper. tolerance :
+    the largest error of the integrator in each step.
 
-    Where two neighbouring rays pass the goal on different sides, the direction that hits it
-    is solved for. Obstacles are not avoided: geodesics that touch one are left out.
+    Where two neighbouring rays pass the goal on different sides, the geodesic between them that
+    ends at the goal is solved for. Obstacles are not avoided: a geodesic that touches one is
+    left out.
     Source: paper, section 5; appendix 6.1.
     """
 
@@ -226,7 +229,7 @@ def _path(problem: Problem, geodesic: Geodesic) -> Path:
 
 
 def _distinct(geodesics: list[Geodesic]) -> tuple[Geodesic, ...]:
-    """Shortest first, those that two brackets found kept once."""
+    """Shortest first, without those that were found twice."""
     kept: list[Geodesic] = []
     for geodesic in sorted(geodesics, key=lambda g: g.length):
         if all(abs(geodesic.angle - other.angle) > 1e-9 for other in kept):
@@ -235,7 +238,7 @@ def _distinct(geodesics: list[Geodesic]) -> tuple[Geodesic, ...]:
 
 
 def _explain(fan: Fan) -> str:
-    """What the fan found, or how near it came."""
+    """What the fan found, or how near its rays came, in words."""
     if fan.geodesics:
         return f"{len(fan.rays)} rays, {len(fan.geodesics)} geodesics"
     if not fan.rays:

@@ -1,4 +1,4 @@
-"""The best answer there is: candidates from fast marching, refined, with a certificate."""
+"""The best solution there is: candidates from fast marching, refined, with a certificate."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ from .finished import with_bound
 class Optimal:
     """Fast marching for the candidates, refinement for the digits, a certificate for proof.
 
-    target_gap : (length - lower bound) / lower bound to reach. routes : locally shortest
-    routes to look for; the shortest is the answer, the others are its alternatives.
+    target_gap : (length - lower bound) / lower bound to reach. routes : how many locally
+    shortest routes to look for. The shortest is the path, the others are its alternatives.
     spacing : of the nodes on which routes are searched, map units; by default a 250th of the
-    region's longer side. time_limit : seconds, looked at between the stages.
+    region's longer side, or a cell of the map where that is less. time_limit : seconds, checked
+    between the stages.
 
-    ``stopped_by`` says whether the gap was met; ``unrefined`` is the path down the distance
-    field, and all there is where the search was stopped before its routes were refined.
+    ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
+    field; it is also the path returned where the run ends before a route was refined.
     """
 
     target_gap: float = 1e-3
@@ -70,7 +71,7 @@ class Optimal:
 
 
 class _Run:
-    """One run, and what was found so far."""
+    """One run, and what it has found so far."""
 
     def __init__(self, planner: Optimal, problem: Problem, stopper: Stopper) -> None:
         self.planner, self.problem = planner, problem
@@ -101,7 +102,7 @@ class _Run:
         return replace(solution, stopped_by=reason)
 
     def find_routes(self) -> None:
-        """The locally shortest routes, on a finer lattice where a coarse one shows none."""
+        """Find the locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
         for lattice in lattices(problem, self.planner.spacing):
             self.total = self.samples + 2 * lattice.nx * lattice.ny
@@ -124,7 +125,7 @@ class _Run:
         return field
 
     def refine_routes(self, from_start: DistanceField, from_goal: DistanceField) -> None:
-        """Keep each route once it is refined, whatever happens to those that come after it."""
+        """Refine the routes; each is kept as soon as it is done, whatever happens later."""
         problem, count = self.problem, self.planner.routes
         found: list[Path] = []
         failures: list[Exception] = []
@@ -138,7 +139,7 @@ class _Run:
                 must_stop=self.must_stop,
             ):
                 if failures and not found:
-                    # The direct way, which comes first, could not be refined, but it is a way.
+                    # The first route could not be refined, but it is a path all the same.
                     found.extend(self.routes)
                 found.append(route)
                 self.routes = shortest(found, count)
@@ -150,7 +151,7 @@ class _Run:
             warn_unfinished(some if found else none, failures[0])
 
     def answer(self) -> Solution:
-        """What was found, without a bound."""
+        """What was found, without a lower bound."""
         path = self.routes[0] if self.routes else None
         status = Status.NOT_FOUND if path is None else Status.SOLVED
         return Solution(
@@ -161,7 +162,7 @@ class _Run:
             cost=None if path is None else path.length,
             seconds=self.stopper.seconds,
             samples=self.samples,
-            stopped_by=self.stopper.stopped_by or "no way between the nodes",
+            stopped_by=self.stopper.stopped_by or "no path between the nodes",
             unrefined=None if path is self.direct else self.direct,
             alternatives=self.routes[1:],
         )

@@ -1,4 +1,4 @@
-"""Plain RRT: the first path, fast, with no claim to be short."""
+"""Plain RRT: the first path it finds, fast; it need not be short."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from .tree_search import TreeOptions, search_tree
 class RRT:
     """Plain RRT: RRT* without neighbours (LaValle 1998).
 
-    It ends within 512 samples of the first path: so many are taken between two looks at it.
+    It ends at most 512 samples after the first path is found, because it looks for one only
+    after each 512 samples.
 
-    samples : at most this many. step : longest edge, map units; by default a twelfth of
-    the region's side. seed : of the one random generator. goal_bias : share of samples
-    that are the goal. time_limit : seconds.
+    samples : at most this many are drawn. step : longest edge, map units; by default a twelfth
+    of the region's side. seed : of the random generator. goal_bias : share of samples that are
+    the goal. time_limit : seconds.
     """
 
     samples: int = 10_000

@@ -199,7 +199,7 @@ class _Tour:
         return self.planned[ends]
 
     def plan(self, leg: Problem, legs: int, callback: Callback | None) -> Solution:
-        """Plan one of so many legs, within its share of the planner's time limit."""
+        """Plan one of ``legs`` legs, within its share of the planner's time limit."""
         planner, limit = self.planner, limit_of(self.planner)
         if limit is not None:
             left = max(limit - (time.perf_counter() - self.started), _LEAST_SECONDS)

@@ -1,4 +1,4 @@
-"""What is asked: a surface, free space, a start and a goal."""
+"""A problem: a surface, free space, a start and a goal."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ class Problem:
 
     surface : Surface. start, goal : (x1, x2), map units, in free space.
     bounds : (x1_min, x2_min, x1_max, x2_max), map units; by default the surface's.
-    obstacles : shapely polygons and lines, ``Circle`` and ``Mask``, map units.
-    The surface's no-data cells are obstacles too.
-    radius : of the vehicle, map units; obstacles of all kinds are inflated by it, so that a path
-    is never nearer to one. Points are obstacles, too, where there is a radius.
-    max_slope : degrees; ground on which the first layer, without its weight, rises more is an
-    obstacle. keep_in : shapely polygon or polygons that the vehicle stays inside of.
-    ``obstacles`` are those given, ``free_space`` is what they leave to the vehicle's centre.
-    Raises OutsideSurfaceError or InputError, naming the value and the remedy.
+    obstacles : shapely polygons and lines, ``Circle`` and ``Mask``, map units. The surface's
+    no-data cells are obstacles too. Points are allowed where there is a radius.
+    radius : of the vehicle, map units. Obstacles of all kinds are inflated by it, so that no path
+    comes nearer to one. max_slope : degrees. Ground is an obstacle where the first layer, without
+    its weight, is steeper. keep_in : shapely polygon or polygons that the vehicle must not leave.
+    name : shown in reports.
+
+    ``obstacles`` are those given; ``free_space`` is where the vehicle's centre may be.
+    Raises OutsideSurfaceError, BlockedError or InputError, naming the value and the remedy.
     """
 
     def __init__(
@@ -88,7 +89,7 @@ class Problem:
             return None
         from ..space.slope_limit import SlopeLimit
 
-        # Ground beyond the bounds keeps the vehicle off, too.
+        # Steep ground just beyond the bounds also keeps the vehicle away.
         return SlopeLimit(self.surface, self.max_slope, self.bounds.widened(self.radius))
 
     @staticmethod
@@ -120,7 +121,10 @@ class Problem:
         raise BlockedError(f"{shown} is {blocker}; move it to free ground")
 
     def between(self, start: Any, goal: Any, names: tuple[str, str] = ("start", "goal")) -> Problem:
-        """The same ground with another start and goal, which errors call by ``names``."""
+        """The same problem with another start and goal, (x1, x2), map units.
+
+        names : what errors call them. Raises as ``Problem`` does.
+        """
         other = copy.copy(self)
         for known in ("straight_length", "is_unreachable"):
             other.__dict__.pop(known, None)
@@ -128,26 +132,26 @@ class Problem:
         return other
 
     def path(self, points: Any) -> Path:
-        """A path of this problem's surface through the given points."""
+        """The path on this problem's surface through points (m, 2), map units."""
         return Path(self.surface, np.asarray(points, np.float64))
 
     @property
     def default_spacing(self) -> float:
-        """The spacing of nodes, map units, where none is asked for."""
+        """The default spacing of lattice nodes, map units."""
         return default_spacing(self.bounds, self.surface.resolution)
 
     @cached_property
     def straight_length(self) -> float:
-        """Length on the surface of the straight way from start to goal, obstacles or not."""
+        """Length on the surface of the straight line from start to goal, through all obstacles."""
         return metric.curve_length(self.surface, [self.start, self.goal])
 
     @cached_property
     def is_unreachable(self) -> bool:
-        """Is it proven that no path leads from start to goal?"""
+        """Is it proven that no path leads from start to goal? False where that is not known."""
         return self.free_space.separates(self.start, self.goal)
 
     def __repr__(self) -> str:
-        # Also of a problem that is only half made, as debuggers show one whose end is refused.
+        # Debuggers also show a problem that is only half made, where its start or goal is refused.
         known = vars(self)
         name = f"{known['name']}: " if known.get("name") else ""
         start, goal, bounds, surface = (
