@@ -180,7 +180,10 @@ def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
         yield "steepest ground", f"{problem.max_slope:g} degrees"
     # In a corridor the area is the corridor's, which is told already.
     if problem.keep_in is not None and solution.corridor is None:
-        yield "keep-in area", f"{problem.keep_in.area:,.6g} {unit}^2" if unit else "given"
+        import shapely
+
+        area = shapely.union_all(problem.keep_in).area
+        yield "keep-in area", f"{area:,.6g} {unit}^2" if unit else "given"
 
 
 def _print_table(rows: Iterable[tuple[str, str]]) -> None:

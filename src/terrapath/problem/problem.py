@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import BlockedError, InputError, OutsideSurfaceError
-from ..space.constraints import Constraints, outside_of
+from ..space.constraints import Area, Constraints, outside_of
 from ..space.free_space import Obstacle
 from ..space.lattice import default_spacing
 from ..surface import Surface, metric
 from ..surface.bounds import Bounds, as_bounds
-from ..validation import as_point, require_not_negative
+from ..validation import Point, PointLike, as_point, require_not_negative
 from .path import Path
 
 if TYPE_CHECKING:
@@ -41,14 +42,14 @@ class Problem:
     def __init__(
         self,
         surface: Surface,
-        start: Any,
-        goal: Any,
-        bounds: Any = None,
+        start: PointLike,
+        goal: PointLike,
+        bounds: Sequence[float] | None = None,
         obstacles: Iterable[Obstacle] = (),
         *,
         radius: float = 0.0,
         max_slope: float | None = None,
-        keep_in: Any = None,
+        keep_in: Area | None = None,
         name: str = "",
     ) -> None:
         self.surface = surface
@@ -93,7 +94,7 @@ class Problem:
         return SlopeLimit(self.surface, self.max_slope, self.bounds.widened(self.radius))
 
     @staticmethod
-    def _make_bounds(surface: Surface, bounds: Any) -> Bounds:
+    def _make_bounds(surface: Surface, bounds: Sequence[float] | None) -> Bounds:
         if bounds is None:
             if surface.bounds is None:
                 raise InputError(
@@ -109,7 +110,7 @@ class Problem:
             )
         return rectangle
 
-    def _check(self, name: str, value: Any) -> tuple[float, float]:
+    def _check(self, name: str, value: PointLike) -> Point:
         point = as_point(value, name)
         if not self.bounds.contains(np.array(point)):
             shown = f"{name}=({point[0]:.10g}, {point[1]:.10g}) is outside the bounds {self.bounds}"
@@ -120,7 +121,9 @@ class Problem:
         shown = f"{name}=({point[0]:.10g}, {point[1]:.10g})"
         raise BlockedError(f"{shown} is {blocker}; move it to free ground")
 
-    def between(self, start: Any, goal: Any, names: tuple[str, str] = ("start", "goal")) -> Problem:
+    def between(
+        self, start: PointLike, goal: PointLike, names: tuple[str, str] = ("start", "goal")
+    ) -> Problem:
         """The same problem with another start and goal, (x1, x2), map units.
 
         names : what errors call them. Raises as ``Problem`` does.
@@ -131,7 +134,7 @@ class Problem:
         other.start, other.goal = self._check(names[0], start), self._check(names[1], goal)
         return other
 
-    def path(self, points: Any) -> Path:
+    def path(self, points: npt.ArrayLike) -> Path:
         """The path on this problem's surface through points (m, 2), map units."""
         return Path(self.surface, np.asarray(points, np.float64))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import shapely
@@ -19,6 +19,9 @@ from .free_space import Circle, FreeSpace, Geometries, Obstacle, are_points, sor
 
 if TYPE_CHECKING:
     from .slope_limit import SlopeLimit
+
+# An area to keep in: shapely polygons.
+Area: TypeAlias = BaseGeometry | Iterable[BaseGeometry]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -127,9 +130,7 @@ def _distance_from_mask(mask: Mask, point: shapely.Point) -> float:
 # The area to keep in
 
 
-def outside_of(
-    area: BaseGeometry | Iterable[BaseGeometry], bounds: Bounds, radius: float
-) -> BaseGeometry:
+def outside_of(area: Area, bounds: Bounds, radius: float) -> BaseGeometry:
     """The plane around an area of polygons, as far as it can matter to a vehicle in the bounds.
 
     Raises InputError where the area is none.
@@ -160,7 +161,7 @@ def _require_polygon(shape: object) -> None:
         )
 
 
-def _polygons(area: BaseGeometry | Iterable[BaseGeometry]) -> Geometries:
+def _polygons(area: Area) -> Geometries:
     """The polygons of one geometry or several, joined where they overlap."""
     try:
         given = [area] if isinstance(area, BaseGeometry) else list(area)
