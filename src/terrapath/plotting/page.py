@@ -1,4 +1,4 @@
-"""A page to turn and zoom: terrain and route in 3-D, in one file that needs no network."""
+"""An interactive page: terrain and route in 3-D, in one file that needs no network."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Stage(NamedTuple):
 
 
 def _shown(text: str) -> str:
-    """A name from a file: neither markup nor letters that cannot be written."""
+    """A name from a file, without markup and without characters that cannot be written."""
     return escape(clean(text))
 
 
@@ -126,7 +126,7 @@ def _terrain_traces(stage: Stage) -> list[Any]:
 
 
 def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
-    """Ground that is not free, a little above the other, by the reason; reasons in the legend."""
+    """Ground that is not free, drawn a little higher; the legend shows the reasons."""
     import plotly.graph_objects as go
 
     terrain = stage.terrain
@@ -162,7 +162,7 @@ def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
 
 
 def _outlines(stage: Stage) -> list[Any]:
-    """Edges of polygons, walls and discs as given, laid over the terrain as one broken line."""
+    """Edges of polygons, walls and discs as given, drawn over the terrain as one broken line."""
     import plotly.graph_objects as go
 
     problem = stage.solution.problem
@@ -190,7 +190,7 @@ def _thinned(route: Route) -> Any:
 
 
 def _route_traces(stage: Stage) -> list[Any]:
-    """The route with what the pointer tells of it, and the next best."""
+    """The route, with what the pointer shows of it, and the next best routes."""
     import plotly.graph_objects as go
 
     solution = stage.solution
@@ -203,8 +203,8 @@ def _route_traces(stage: Stage) -> list[Any]:
     )
     height, unit = surface.layers[0], surface.unit
     # Distance, height, slope along, slope of the ground, place.
-    told = np.column_stack([profile.distance, profile.values[:, 0], *slopes(solution.path)])
-    told = np.column_stack([told, profile.points])[kept]
+    shown = np.column_stack([profile.distance, profile.values[:, 0], *slopes(solution.path)])
+    shown = np.column_stack([shown, profile.points])[kept]
     template = (
         f"distance %{{customdata[0]:.6g}}{_suffix(unit)}"
         f"<br>{_shown(height.name)} %{{customdata[1]:.6g}}{_suffix(height.unit)}"
@@ -227,7 +227,7 @@ def _route_traces(stage: Stage) -> list[Any]:
             mode="lines",
             line={"color": PATH_COLOUR, "width": 7},
             name="route",
-            customdata=told,
+            customdata=shown,
             hovertemplate=template,
         )
     )
@@ -347,13 +347,13 @@ def draw_page(solution: Solution) -> Any:
 
 
 def require_known_page(path: Path) -> None:
-    """Raise MapError for an ending that is no page's."""
+    """Raise MapError for a suffix other than .html."""
     if path.suffix.lower() != ENDING:
         raise MapError(f"page={str(path)!r} has no known format; end it in {ENDING}")
 
 
 def plot_page(solution: Solution, path: str | Path) -> None:
-    """Write an interactive 3-D page (.html) that holds all it needs, whole or not at all."""
+    """Write an interactive 3-D page (.html) that needs no other file, completely or not at all."""
     target = Path(path)
     require_known_page(target)
     page = draw_page(solution).to_html(
