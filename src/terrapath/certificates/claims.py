@@ -131,8 +131,8 @@ class Ground(NamedTuple):
     """
 
     surface: Peaks | Spline
-    start: Array  # lifted, (2 + layers,)
-    goal: Array
+    start: Array  # (2 + layers,), in R^n
+    goal: Array  # (2 + layers,), in R^n
 
 
 def _ground(problem: Problem) -> Ground:
@@ -240,7 +240,7 @@ def proven_norm(problem: Problem, claim: Claim, found: Array, enough: float = 0.
 class End(NamedTuple):
     """The start or the goal."""
 
-    core: Core
+    core: Core  # the cells around it
     place: Point  # map units
     lifted: Array  # (2 + layers,), in R^n, with the start as the origin of the plane
     doubt: float  # how much a chord may be too long because of rounding, map units

@@ -187,9 +187,10 @@ def _allocate(lattice: Lattice) -> Nodes:
 class DistanceField:
     """Distances under h from one source, at the nodes of a lattice.
 
-    source : (x1, x2), map units. medium : the metric on the lattice. values : (ny, nx), map units,
-    infinite where no path was found on the lattice. problem : from the source to itself, with the
-    constraints that were asked for; None where the field was not made from a problem.
+    surface, free_space : where distances are measured. source : (x1, x2), map units. medium : the
+    metric on the lattice. values : (ny, nx), map units, infinite where no path was found on the
+    lattice. problem : from the source to itself, with the constraints that were asked for; None
+    where the field was not made from a problem.
     """
 
     surface: Surface

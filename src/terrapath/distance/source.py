@@ -25,11 +25,11 @@ Nodes = npt.NDArray[np.int64]
 class SourceModel(NamedTuple):
     """The distance from the source in closed form, on a window of nodes around it."""
 
-    row: int  # of the lattice, the window's first
-    column: int
+    row: int  # of the lattice: the window's first
+    column: int  # likewise
     values: Array  # (rows, columns), map units, NaN where the model does not hold
-    slope_x: Array  # (rows, columns), map units per node
-    slope_y: Array
+    slope_x: Array  # (rows, columns), of the distance along x1, map units per node
+    slope_y: Array  # (rows, columns), along x2
     seeds: Nodes  # (k,), numbers of the nodes that take the model's value
     seed_values: Array  # (k,), map units
 

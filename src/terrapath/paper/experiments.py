@@ -20,10 +20,10 @@ from .runner import Runner
 class Printed:
     """The numbers that the paper prints for a scene. Lengths are in map units."""
 
-    rrt_star_r: float
-    geodesic: float
-    directions: int
-    chord: float
+    rrt_star_r: float  # mean of RRT*-R
+    geodesic: float  # by geodesic traversal
+    directions: int  # of that traversal
+    chord: float  # mean of the chord baseline
 
 
 PRINTED = {
@@ -48,11 +48,11 @@ SECTOR = (-math.pi / 6.0, 2.0 * math.pi / 3.0)
 class Scale:
     """How many samples and runs there are. The defaults are the paper's, where it gives them."""
 
-    samples: int = 10_000
-    seeds: int = 10
-    repeats: int = 150
+    samples: int = 10_000  # of a run
+    seeds: int = 10  # runs of a planner on a scene
+    repeats: int = 150  # runs on each scene of the repeat experiment
     convergence_samples: tuple[int, ...] = tuple(range(2_000, 20_001, 2_000))
-    convergence_runs: int = 10
+    convergence_runs: int = 10  # with each number of samples
     directions: int = 4_000  # of the search for the true length, and of the sensitivity
 
 
@@ -71,7 +71,7 @@ QUICK = Scale(
 class Settings:
     """The settings of a reproduction. Trials take the seeds ``seed``, ``seed`` + 1, and so on."""
 
-    scale: Scale = field(default=FULL)
+    scale: Scale = field(default=FULL)  # how much is run
     seed: int = 0
 
     def planner(self, run: int = 0, *, chord: bool = False, **options: Any) -> RRTStar:
@@ -112,7 +112,7 @@ class StepEffect:
     """What the planners find with one step."""
 
     step: float  # map units
-    rrt_star_r: list[PlannedPath]
+    rrt_star_r: list[PlannedPath]  # one for each seed
     chord: list[PlannedPath]
 
 
@@ -122,7 +122,7 @@ class SceneData:
 
     scene: str
     printed: Printed
-    truth: FanSummary
+    truth: FanSummary  # of the search for the true length
     traversal: FanSummary  # with the paper's number of directions
     steps: list[StepEffect]  # one for each of STEPS
 
@@ -153,11 +153,11 @@ def run_scene(scene: str, settings: Settings, runner: Runner) -> SceneData:
 class ComparedPath:
     """A path's true length under the metrics of both scenes, and its profile."""
 
-    planned_on: str
+    planned_on: str  # the scene
     height_only: float  # length under h of four-peaks, map units
     with_resistance: float  # length under h of six-peaks, map units
-    highest: float  # along the path
-    most_resistance: float
+    highest: float  # height along the path
+    most_resistance: float  # along the path
 
 
 @dataclass(frozen=True)
@@ -165,8 +165,8 @@ class ComparativeData:
     """Paths planned without and with the ground's resistance."""
 
     paths: list[ComparedPath]  # every seed on four-peaks, then every seed on six-peaks
-    true_height_only: float
-    true_with_resistance: float
+    true_height_only: float  # true length on four-peaks, map units
+    true_with_resistance: float  # true length on six-peaks, map units
 
     def planned_on(self, scene: str) -> list[ComparedPath]:
         """The paths that were planned on one of the scenes."""
@@ -203,7 +203,7 @@ class RepeatData:
 
     scene: str
     lengths: list[float]  # map units
-    truth: FanSummary
+    truth: FanSummary  # of the search for the true length
 
 
 def run_repeat(settings: Settings, runner: Runner) -> list[RepeatData]:
@@ -228,7 +228,7 @@ class ConvergenceData:
     scene: str
     samples: tuple[int, ...]
     lengths: list[list[float]]  # for each number of samples, map units
-    true_length: float
+    true_length: float  # map units
 
 
 def run_convergence(settings: Settings, runner: Runner) -> ConvergenceData:
@@ -252,9 +252,9 @@ class SensitivityData:
     """How far the ends of a scene's geodesics move with their directions."""
 
     scene: str
-    truth: FanSummary
-    sweep: Sweep
-    found: SweepSummary
+    truth: FanSummary  # of the search for the true length
+    sweep: Sweep  # the rays
+    found: SweepSummary  # the movement of their ends
 
 
 def run_sensitivity(settings: Settings, runner: Runner) -> list[SensitivityData]:

@@ -44,7 +44,7 @@ class SmoothedPath:
     surface: str
     scale: float  # map units
     largest_change: float  # of the height
-    rms_change: float
+    rms_change: float  # root mean square, of the height
     length: float  # of the path found, under the smoothed surface's h, map units
     true_length: float  # of the sharp surface's geodesic
 

@@ -31,8 +31,8 @@ def digest(record: Any) -> str:
 def rebuilt(kind: Any, record: Any) -> Any:
     """The object that ``dataclasses.asdict`` made a record of, from the record's JSON.
 
-    kind : a dataclass. Its fields are numbers, texts, dataclasses, tuples of one of these, or one of
-    these or None.
+    kind : a dataclass. Its fields are numbers, texts, dataclasses, tuples of one of these, or one
+    of these or None.
     """
     if record is None:
         return None

@@ -249,11 +249,10 @@ def joined(problem: Problem, legs: Sequence[Solution], count: int) -> Solution:
         counters=dict(counters),
         legs=tuple(legs),
     )
-    bounds = [leg.lower_bound for leg in legs]
-    if solution.length is None or any(bound is None for bound in bounds):
+    proven = [leg.lower_bound for leg in legs if leg.lower_bound is not None]
+    if solution.length is None or len(proven) < len(legs):
         return solution
-    least = min(sum(bound or 0.0 for bound in bounds), solution.length)  # rounding apart
-    return replace(solution, lower_bound=least)
+    return replace(solution, lower_bound=min(sum(proven), solution.length))  # rounding apart
 
 
 def _reasons(legs: Sequence[Solution], count: int) -> str:

@@ -36,18 +36,18 @@ STEPS_PER_SIDE = 12.0
 class TreeOptions:
     """The options of a tree planner; see ``RRTStar``."""
 
-    planner: str
-    samples: int
-    step: float | None
-    radius_factor: float
+    planner: str  # its name
+    samples: int  # at most this many
+    step: float | None  # map units, None for the default
+    radius_factor: float  # 0 for a tree that is never rewired
     goal_bias: float
     seed: int
-    riemannian: bool
+    riemannian: bool  # edges are measured by Line-R, not by the chord
     prune: bool
     informed: bool
-    panel: float | None = None
-    time_limit: float | None = None
-    target_length: float = 0.0
+    panel: float | None = None  # map units, None for the default
+    time_limit: float | None = None  # seconds
+    target_length: float = 0.0  # map units; infinite to stop at the first path
 
 
 def default_step(problem: Problem) -> float:

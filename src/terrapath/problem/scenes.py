@@ -35,9 +35,9 @@ REPEAT_RESISTANCE = [*_alike(3.0, (2.0, 8.0), (8.0, 8.0)), (7.0, 0.5, 5.0, 5.0)]
 class Scene:
     """A built-in problem.
 
-    load : makes the problem. true_length : of the shortest path, map units, None where it is not
-    known. It is the length of the shortest geodesic that 6,000 rays in a sector of 130 degrees
-    find, solved to ten digits.
+    name, description : for people. load : makes the problem. true_length : of the shortest path,
+    map units, None where it is not known. It is the length of the shortest geodesic that 6,000
+    rays in a sector of 130 degrees find, solved to ten digits.
     """
 
     name: str

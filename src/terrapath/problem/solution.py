@@ -73,12 +73,12 @@ class Solution:
     planner's own measure of it. ``lower_bound`` is None where none was asked for.
     """
 
-    problem: Problem
+    problem: Problem  # as it was asked
     planner: str  # its name
-    status: Status
+    status: Status  # how the planner ended
     path: Path | None
     cost: float | None  # map units
-    seconds: float
+    seconds: float  # planning took, with refinement and bound
     samples: int = 0  # samples drawn, nodes settled or rays traced
     seed: int | None = None  # None for planners that draw no random numbers
     stopped_by: str = ""  # what ended the search, in words

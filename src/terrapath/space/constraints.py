@@ -28,9 +28,10 @@ Area: TypeAlias = BaseGeometry | Iterable[BaseGeometry]
 class Constraints:
     """All that limits where a path may go, as it was given, and the vehicle's radius.
 
-    obstacles : as given, not inflated. nodata : the surface's cells without data. slope_limit :
-    which ground is too steep. outside : the plane around the area to keep in. Each of these
-    three is None where there is none. radius : of the vehicle, map units.
+    bounds : of the plane, map units. obstacles : as given, not inflated. nodata : the surface's
+    cells without data. slope_limit : which ground is too steep. outside : the plane around the
+    area to keep in. Each of these three is None where there is none. radius : of the vehicle, map
+    units.
     """
 
     bounds: Bounds

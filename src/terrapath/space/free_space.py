@@ -72,8 +72,8 @@ class Parts(NamedTuple):
 
     geometries: Geometries  # (m,)
     owners: Indices  # (m,): the obstacle that each belongs to
-    circles: list[Circle]
-    masks: list[Mask]
+    circles: list[Circle]  # in their order
+    masks: list[Mask]  # in their order
 
 
 def sort_obstacles(obstacles: Iterable[Obstacle]) -> Parts:

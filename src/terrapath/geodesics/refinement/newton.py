@@ -28,9 +28,9 @@ FARTHEST_SHARE = 0.05
 class Lifted(NamedTuple):
     """A polyline, with what kernels need to know of the surface above it.
 
-    energy : the number of pieces times the sum of squared chords, each times its squared cost. It
-    is least where the pieces are equally long and the polyline is shortest; then it is the square
-    of the length.
+    strand : what kernels read and write. energy : the number of pieces times the sum of squared
+    chords, each times its squared cost. It is least where the pieces are equally long and the
+    polyline is shortest; then it is the square of the length.
     """
 
     strand: kernels.Strand
