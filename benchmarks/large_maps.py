@@ -17,8 +17,7 @@ from terrapath.io import read_surface
 from terrapath.paper.runner import Runner
 from terrapath.paper.trials import Trial
 from terrapath.planners import make_finished
-from terrapath.planners.base import MOST_CELLS
-from terrapath.planners.corridor import Part, plan_in_corridor
+from terrapath.planners.corridor import MOST_CELLS, Part, plan_in_corridor
 from terrapath.problem import Problem
 
 from .processes import answer, run_fresh

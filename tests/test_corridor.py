@@ -12,7 +12,7 @@ import terrapath as tp
 from terrapath.cli.main import run
 from terrapath.errors import InputError
 from terrapath.io.maps import count_cells
-from terrapath.planners import base, corridor, make_finished
+from terrapath.planners import corridor, make_finished
 from terrapath.planners.corridor import Corridor, Part, factor, plan_in_corridor
 
 COUNT, CELL = 300, 10.0
@@ -36,7 +36,7 @@ def read(part):
 
 @pytest.fixture
 def small_limits(monkeypatch):
-    monkeypatch.setattr(base, "MOST_CELLS", 10_000)
+    monkeypatch.setattr(corridor, "MOST_CELLS", 10_000)
     monkeypatch.setattr(corridor, "COARSE_CELLS", 3_600)
     monkeypatch.setattr(corridor, "HALF_WIDTH", 6.0)
 

@@ -87,7 +87,7 @@ def _solve(planner: Finished, asked: Itinerary, every: bool, quiet: bool) -> Ans
 
 def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
     """Is the map too large to be planned on as a whole? InputError for what needs it whole."""
-    from ..planners.base import MOST_CELLS
+    from ..planners.corridor import MOST_CELLS
 
     if scenario.planner.corridor == "none" or cells <= MOST_CELLS:
         return False

@@ -12,9 +12,6 @@ from ..problem import Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..validation import require_positive
 
-# A map with more cells is planned on coarse to fine, in a corridor.
-MOST_CELLS = 16_000_000
-
 # Why a search was not needed: it is proven that there is no path.
 SEPARATED = "start and goal lie in different parts of the free space"
 
@@ -30,15 +27,18 @@ SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bo
 
 
 class Progress(NamedTuple):
-    """How far a running planner is."""
+    """How far a running planner is.
+
+    stage : SEARCHING, REFINING or PROVING. leg : which leg of a tour is planned.
+    """
 
     samples: int  # taken so far: samples, nodes or rays
     total: int  # of them, at most
     seconds: float  # since the run began
     best_cost: float  # map units, infinite before the first path
     lower_bound: float = 0.0  # map units, 0 before one is proven
-    stage: str = SEARCHING  # or REFINING, or PROVING
-    leg: str = ""  # which leg of a tour, in words
+    stage: str = SEARCHING
+    leg: str = ""  # of a tour, in words
 
     @property
     def gap(self) -> float:

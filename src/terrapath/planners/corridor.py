@@ -22,7 +22,9 @@ from ..validation import Array, PointLike, require_positive
 from . import FastMarching, Finished, plan_tour
 from .base import Callback, Planner, Progress
 
-# The map is first read so coarse that it has about this many cells.
+# A map with more cells than that is planned on coarse to fine.
+MOST_CELLS = 16_000_000
+# It is read about so coarse at first.
 COARSE_CELLS = 1_000_000
 # No more cells than this are read of the corridor's surroundings; a larger window is read coarser.
 MOST_FINE_CELLS = 120_000_000

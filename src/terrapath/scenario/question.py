@@ -26,26 +26,19 @@ def is_scenario(where: str) -> bool:
 
 def scenario_of(where: str, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
     """What the command line asks: a scenario file's values, and over them its own."""
+    from ..problem.scenes import SCENES
+
     if is_scenario(where):
         from .toml import read_scenario
 
         scenario = read_scenario(where)
     else:
-        place = MapSection(scene=where) if _is_scene(where) else MapSection(path=where)
+        place = MapSection(scene=where) if where in SCENES else MapSection(path=where)
         scenario = Scenario(map=place)
     asked = scenario.overridden(given)
     for file in asked.files():
         _exists(Path(file))
     return asked
-
-
-def _is_scene(where: str) -> bool:
-    """Is that the name of a built-in scene? None has a suffix, as files of maps do."""
-    if Path(where).suffix:
-        return False
-    from ..problem.scenes import SCENES
-
-    return where in SCENES
 
 
 class Place(NamedTuple):
@@ -157,11 +150,11 @@ class Question:
 
     def _require_map(self) -> Path:
         """The map's path; InputError where there can be none."""
+        from ..problem.scenes import names
+
         asked = self.scenario.map
         path = Path(asked.path or "")
         if not _exists(path) and not path.suffix and ":" not in str(path):
-            from ..problem.scenes import names
-
             raise InputError(
                 f"{asked.path!r} is neither a built-in scene ({', '.join(names())}) nor a file"
             )
