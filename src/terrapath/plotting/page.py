@@ -347,7 +347,7 @@ def draw_page(solution: Solution) -> Any:
 
 
 def require_known_page(path: Path) -> None:
-    """Raise MapError for a suffix other than .html."""
+    """Raise MapError for an ending that is no page's."""
     if path.suffix.lower() != ENDING:
         raise MapError(f"page={str(path)!r} has no known format; end it in {ENDING}")
 
