@@ -15,8 +15,8 @@ from .tree_search import TreeOptions, search_tree
 class RRT:
     """Plain RRT: RRT* without neighbours (LaValle 1998).
 
-    It ends at most 512 samples after the first path is found, because it looks for one only
-    after each 512 samples.
+    It ends within 512 samples of the first path, because it looks for a path only after each
+    512 samples.
 
     samples : at most this many are drawn. step : longest edge, map units; by default a twelfth
     of the region's side. seed : of the random generator. goal_bias : share of samples that are
