@@ -165,12 +165,13 @@ def measure_large_map(path: str, runs: LargeMapRuns) -> LargeMapFound:
     if solution.length is None or solution.lower_bound is None:
         raise TerrapathError(f"no path was found: {solution.stopped_by}")
     corridor = solution.corridor
+    assert corridor is not None
     least = corridor.least_length(solution)
     assert least is not None  # without costs
     return LargeMapFound(
         Timing.of([Reading(*reading)]),
         solution.length,
-        corridor.coarse.length,
+        corridor.coarse_length,
         least,
         solution.lower_bound,
         before,

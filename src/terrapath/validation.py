@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy.typing as npt
 from .errors import InputError
 
 Array = npt.NDArray[np.float64]
+Point = tuple[float, float]
+PointLike = Sequence[float] | Array  # (x1, x2), not checked yet
 
 
 def as_array(values: Any, name: str, *, shape: tuple[int | None, ...]) -> Array:
@@ -36,7 +39,7 @@ def as_array(values: Any, name: str, *, shape: tuple[int | None, ...]) -> Array:
     return array
 
 
-def as_point(value: Any, name: str) -> tuple[float, float]:
+def as_point(value: Any, name: str) -> Point:
     """One finite point of the plane."""
     try:
         x, y = (float(coordinate) for coordinate in value)

@@ -138,7 +138,7 @@ def test_without_a_coarse_way_nothing_is_proven(small_limits):
 
     solution = plan_in_corridor(pose, PLANNER, COUNT**2)
     assert solution.status is tp.Status.NOT_FOUND
-    assert solution.stopped_by == "no way on the map read 5 times coarser"
+    assert solution.stopped_by == "no path on the map read 5 times coarser"
     assert solution.corridor is None
 
 

@@ -462,7 +462,7 @@ def test_a_way_narrower_than_the_spacing_is_not_found(name):
     assert tp.plan(shifted, name, spacing=1.0).status is tp.Status.SOLVED
     solution = tp.plan(narrow, name, spacing=1.0)
     assert solution.status is tp.Status.NOT_FOUND
-    assert solution.stopped_by == "no way on from the nodes reached"
+    assert solution.stopped_by == "no path on from the nodes reached"
     assert solution.samples > 60
     assert solution.counters["vertices"] > solution.samples
 

@@ -207,7 +207,7 @@ def test_where_the_nodes_show_no_way_finer_ones_are_tried(name, enclosed, monkey
     monkeypatch.setattr(module, "march_from", march_and_note)
     solution = tp.plan(enclosed, name, spacing=0.4)
     assert solution.status is tp.Status.NOT_FOUND
-    assert solution.stopped_by == "no way between the nodes"
+    assert solution.stopped_by == "no path between the nodes"
     assert nodes == [31, 61, 121]
 
 

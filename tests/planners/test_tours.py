@@ -19,7 +19,7 @@ from terrapath.planners import (
     plan_goals,
     plan_tour,
 )
-from terrapath.planners.base import stay_put
+from terrapath.planners.base import least_limit, stay_put
 from terrapath.surface.metric import curve_length
 
 FAST = make_finished("fast-marching", spacing=0.4, refine=True, bound=True)
@@ -172,14 +172,14 @@ def test_the_callback_is_told_which_leg_it_sees(problem):
 
 @dataclass(frozen=True)
 class Timed:
-    """Notes the time limit that it has for each leg."""
+    """Notes the time limit that it is given for each leg."""
 
     time_limit: float | None
     limits: list = field(default_factory=list)
     name: str = "timed"
 
-    def solve(self, leg, *, callback=None):
-        self.limits.append(self.time_limit)
+    def solve(self, leg, *, callback=None, time_limit=None):
+        self.limits.append(least_limit(self.time_limit, time_limit))
         return stay_put(leg, self.name)
 
 

@@ -14,8 +14,8 @@ from scipy import ndimage
 import terrapath as tp
 from common import FLAT, REAL_MAPS
 from oracles import boxes_of_mask
-from terrapath.space.constraints import inflated
-from terrapath.space.slope_limit import Steepness
+from terrapath.space.inflation import inflated
+from terrapath.space.slope_limit import SlopeLimit
 from terrapath.surface.bounds import Bounds
 
 SIDE = 10.0
@@ -225,7 +225,7 @@ def test_large_masks_grow_in_parts_as_they_do_at_once(monkeypatch):
     mask = tp.Mask(random.random((120, 120)) < 0.003, axis, axis)
     bounds = Bounds(0, 0, 119, 119)
     (whole,) = inflated([mask], 5.5, bounds)
-    monkeypatch.setattr("terrapath.space.constraints.MOST_CELLS_AT_ONCE", 120)
+    monkeypatch.setattr("terrapath.space.inflation.MOST_CELLS_AT_ONCE", 120)
     (parts,) = inflated([mask], 5.5, bounds)
     assert (whole.blocked == parts.blocked).all()
     assert 0.1 < whole.blocked.mean() < 0.9
@@ -248,7 +248,7 @@ def test_slopes_are_the_surfaces_own_by_scipy_and_those_of_numpy():
     x, y = 5.0 + 2.0 * np.arange(17), -2.0 + 3.0 * np.arange(13)
     heights = random.normal(size=(13, 17)).cumsum(axis=0)
     surface = tp.Surface.from_grid(heights, x, y)
-    steepness = Steepness(surface, 45.0, surface.bounds)
+    steepness = SlopeLimit(surface, 45.0, surface.bounds)
     found = np.vstack([steepness._slopes_of_rows(*rows) for rows in ((0, 3), (3, 4), (4, 13))])
     assert (found == steepness._slopes_of_rows(0, 13)).all()
     along, across = np.gradient(heights, 3.0, 2.0)
@@ -358,10 +358,10 @@ def test_heights_in_feet_on_a_plane_in_metres_are_compared_in_metres():
     heights = np.meshgrid(axis, axis)[0]  # 45 degrees if in metres, 17 if in feet
     for unit, blocked in (("m", True), ("ft", False), ("", True)):
         surface = tp.Surface.from_grid(heights, axis, axis, units=[unit], georeference=Placed())
-        assert (Steepness(surface, 30.0, surface.bounds).mask is not None) == blocked
+        assert (SlopeLimit(surface, 30.0, surface.bounds).mask is not None) == blocked
     surface = tp.Surface.from_grid(heights, axis, axis, units=["K"], georeference=Placed())
     with pytest.raises(tp.InputError, match="'K'"):
-        Steepness(surface, 30.0, surface.bounds)
+        SlopeLimit(surface, 30.0, surface.bounds)
 
 
 # Keeping in

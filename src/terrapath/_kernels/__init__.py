@@ -1,8 +1,8 @@
-"""Floor 0: the numerical core.
+"""The numerical core; its sub-folders mirror the packages above.
 
 Every function here is a Numba kernel over plain arrays and ``NamedTuple``s of
-arrays. Kernels allocate as little as possible, never raise, never touch global
-state, and import nothing from the floors above, so that each one can be read,
-timed and tested alone. They run unchanged as plain Python when
-``NUMBA_DISABLE_JIT=1``.
+arrays. Kernels allocate as little as possible, never raise and never touch
+global state. They import nothing from the layers above, so that each one can be
+read, timed and tested alone. With ``NUMBA_DISABLE_JIT=1`` they run unchanged as
+plain Python.
 """

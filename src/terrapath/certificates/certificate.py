@@ -1,7 +1,7 @@
-"""Certificates: claims that know which problem they speak of, to be kept and checked again.
+"""Certificates: claims about a certain problem, to be stored and checked again.
 
-What is claimed, and how that is proven, is in ``proofs``. Here a claim gets the fingerprint of its
-problem, a seal, and a file.
+What is claimed, and how it is proven, is described in ``claims``. Here a claim gets the fingerprint
+of its problem and a seal, and is written to a file.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .._support.files import written_whole
 from ..errors import CertificateError, MapError
@@ -29,10 +30,10 @@ class Certificate(Claim):
     """A lower bound on the length of every path, with all that is needed to check it.
 
     value : the bound, map units. norm, coefficients, bounds, horizon, start_core, goal_core : the
-    claim's, which proves the bound; what they are is told by ``proofs.Claim``. fingerprint : of
-    the problem that it speaks of. seal : a hash of all the others, so that what was altered by
-    mistake is told from what is wrong.
-    A certificate compares with numbers as its value.
+    proof of it, as described in ``claims.Claim``. fingerprint : a hash of the problem that it is
+    about. seal : a hash of all other fields. A wrong seal shows that the certificate was altered;
+    a claim that was wrong from the start has a right one.
+    A certificate compares with numbers by its value.
     """
 
     fingerprint: str
@@ -53,13 +54,13 @@ class Certificate(Claim):
         return hash(self.value)
 
     def check(self, problem: Problem) -> float:
-        """Prove the claim again from nothing but the problem; returns the bound, map units.
+        """Prove the claim again from the problem alone; returns the bound, map units.
 
-        Raises CertificateError, saying what does not hold.
+        Raises CertificateError, which says what does not hold.
         """
         if self.fingerprint != fingerprint(problem):
             raise CertificateError(
-                f"the certificate speaks of problem {self.fingerprint[:12]}, this is "
+                f"the certificate is about problem {self.fingerprint[:12]}, this is "
                 f"{fingerprint(problem)[:12]}: surface, weights, obstacles, start or goal differ"
             )
         require_sound(self)
@@ -72,7 +73,10 @@ class Certificate(Claim):
         return self.value
 
     def save(self, path: str | FilePath) -> None:
-        """Write the certificate into an .npz file, whole or not at all."""
+        """Write the certificate to an .npz file, completely or not at all.
+
+        Raises MapError where the file cannot be written.
+        """
         with written_whole(FilePath(path)) as temporary, temporary.open("wb") as file:
             np.savez_compressed(
                 file,
@@ -89,9 +93,12 @@ class Certificate(Claim):
 
     @classmethod
     def load(cls, path: str | FilePath) -> Certificate:
-        """Read what ``save`` wrote. Raises MapError where there is nothing, or something else."""
+        """Read what ``save`` wrote.
+
+        Raises MapError for a file that is missing, or of another kind.
+        """
         try:
-            # Opened here, for NumPy leaves open what it cannot read.
+            # Opened here, because NumPy does not close a file that it cannot read.
             with FilePath(path).open("rb") as source, np.load(source, allow_pickle=False) as file:
                 return cls(
                     value=float(file["value"]),
@@ -106,20 +113,20 @@ class Certificate(Claim):
                 )
         except FileNotFoundError:
             raise MapError(f"{path} does not exist; check the path") from None
-        except Exception as error:  # of a foreign file, zip, zlib and NumPy raise whatever they do
+        except Exception as error:  # for other files zip, zlib and NumPy raise errors of many kinds
             reason = " ".join(str(error).split()) or type(error).__name__
             raise MapError(f"{path} is not a certificate: {reason:.200}") from None
 
 
 def fingerprint(problem: Problem) -> str:
-    """A hash of everything that a bound depends on."""
+    """A hash of all that a lower bound depends on."""
     data = problem.surface.data
     ends = (problem.bounds, problem.start, problem.goal)
     return _hash(type(data).__name__, *data, *ends, *problem.free_space.data)
 
 
 def seal_of(certificate: Certificate) -> str:
-    """A hash of all that a certificate holds, but its seal."""
+    """A hash of all fields of a certificate except its seal."""
     return _hash(
         certificate.fingerprint,
         certificate.value,
@@ -132,7 +139,7 @@ def seal_of(certificate: Certificate) -> str:
     )
 
 
-def _hash(*parts: Any) -> str:
+def _hash(*parts: str | npt.ArrayLike) -> str:
     """SHA-256 of texts and arrays of numbers, their shapes included."""
     digest = hashlib.sha256()
     for part in parts:
@@ -145,9 +152,10 @@ def _hash(*parts: Any) -> str:
 
 
 def certify(problem: Problem, proposal: Claim, found: Needs) -> Certificate:
-    """The certificate of the norm and the value that are proven; found : what the cells need.
+    """The certificate with the norm and the value that can be proven.
 
-    Where no norm can be proven, the straight line's length in R^n is the bound.
+    proposal : whose norm and value are not proven yet. found : what the cells need. Where no norm
+    can be proven, the length of the straight line in R^n is the bound.
     """
     proven = proven_claim(problem, proposal, found)
     claimed = {field.name: getattr(proven, field.name) for field in fields(Claim)}

@@ -1,8 +1,8 @@
-"""Claims: a function whose slope proves that no path is shorter, and the proofs of it.
+"""Claims: lower bounds, each with a function that proves it; and the proofs.
 
-Where |du| <= M in the dual norm of h, u / M grows by at most a path's length along it. So a
-path from start to goal is at least (u(goal) - u(start)) / M long. Nothing here knows how u
-was found: a proof trusts the problem's surface and obstacles, and nothing else.
+Let the dual norm of du under h be at most M. Then along a path u / M grows by no more than the
+path's length. So a path from start to goal is at least (u(goal) - u(start)) / M long. A proof
+uses the problem's surface and obstacles only, and not how u was found.
 """
 
 from __future__ import annotations
@@ -10,38 +10,38 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from .._kernels.certificates import norms as kernels
-from .._kernels.surface.surfaces import Spline, fill_values
+from .._kernels.surface.surfaces import Peaks, Spline, fill_values
 from ..errors import CertificateError
 from ..problem import Problem
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
 from ..surface.layers import span_within
-from ..validation import Array
+from ..validation import Array, Point
 
-# Far above the rounding of the checker's own arithmetic, far below any gap.
+# A relative margin, far above the rounding errors of the checker, far below any gap.
 ROUNDING = 1e-9
 
-# Far above the rounding of a layer's value, in units of the last place of its largest.
+# A margin for the rounding of a layer's value, in units in the last place of its largest value.
 EPSILONS = 64.0
 
-# A norm is not proven any closer than this to what samples of it suggest.
+# A norm is proven to within this share of what samples of it suggest, and no closer.
 CLOSE = 3e-5
 
-# Nor below this: a function that is steep nowhere proves nothing, and squares of slopes far below
-# would be rounded to 0.
+# The least norm: a function that is nearly flat proves nothing, and the squares of its slopes would
+# be rounded to 0.
 FLATTEST = 1e-3
 
 Cells = npt.NDArray[np.bool_]
 
 
 class Core(NamedTuple):
-    """Cells around an end, [column0, column1) x [row0, row1), where the chord counts."""
+    """The cells [column0, column1) x [row0, row1) around an end, where the chord replaces u."""
 
     column0: int
     column1: int
@@ -51,13 +51,14 @@ class Core(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Claim:
-    """A lower bound on the length of every path, and the function that is to prove it.
+    """A lower bound on the length of every path, and the function u that is to prove it.
 
-    value : the bound, map units. norm : M, of the dual norm of du on all cells that matter.
+    value : the bound, map units. norm : M, the largest dual norm of du on all cells that matter.
     coefficients : (ny + 2, nx + 2), of the bicubic B-spline u on the cells of a lattice over
-    ``bounds``. horizon : W; cells matter from which the goal could be reached before u / M is
-    W / M. start_core, goal_core : the cells around the ends, where the chord takes the place
-    of u. Outside ``bounds`` every path is long enough on the plane already.
+    ``bounds``. horizon : W; a cell matters where the goal may be nearer than (W - u) / M.
+    start_core, goal_core : the cells around the ends, where the chord replaces u.
+    bounds : the rectangle of the lattice, map units. A path that leaves it is already long enough
+    on the plane.
     """
 
     value: float
@@ -70,13 +71,13 @@ class Claim:
 
     @cached_property
     def lattice(self) -> Lattice:
-        """The lattice whose cells u is given on."""
+        """The lattice on whose cells u is given."""
         rows, columns = self.coefficients.shape
         return Lattice(self.bounds, columns - 2, rows - 2)
 
 
 def require_sound(claim: Claim) -> None:
-    """Raise CertificateError where a number is none, or the coefficients are no spline's."""
+    """Raise CertificateError for numbers that are not finite, or a wrong array of coefficients."""
     value, norm, horizon = claim.value, claim.norm, claim.horizon
     finite = all(map(math.isfinite, (value, norm, horizon)))
     if not (finite and norm >= FLATTEST * (1.0 - ROUNDING)):
@@ -95,7 +96,7 @@ def require_sound(claim: Claim) -> None:
 
 
 def _require_fit(problem: Problem, claim: Claim) -> None:
-    """Raise CertificateError where the parts do not belong together."""
+    """Raise CertificateError where the claim does not fit the problem."""
     if not problem.bounds.encloses(claim.bounds):
         raise CertificateError(
             f"the certificate covers {claim.bounds}, which is not within {problem.bounds}"
@@ -124,19 +125,19 @@ def _overlap(a: Core, b: Core) -> bool:
 
 
 class Ground(NamedTuple):
-    """The surface and the ends as kernels read them, the start being the origin of the plane.
+    """The surface and the ends for kernels, with the start as the origin of the plane.
 
-    So no digits are lost far from the map's own origin, nor between ends that lie close.
+    So no digits are lost far from the map's origin, or where the ends lie close together.
     """
 
-    surface: Any
-    start: Array  # lifted, (2 + layers,)
-    goal: Array
+    surface: Peaks | Spline
+    start: Array  # (2 + layers,), in R^n
+    goal: Array  # (2 + layers,), in R^n
 
 
 def _ground(problem: Problem) -> Ground:
     (x, y), data = problem.start, problem.surface.data
-    moved: Any
+    moved: Peaks | Spline
     if isinstance(data, Spline):
         moved = data._replace(x0=data.x0 - x, y0=data.y0 - y)
     else:
@@ -147,8 +148,8 @@ def _ground(problem: Problem) -> Ground:
     return Ground(moved, *np.concatenate([ends, values * data.weights], axis=1))
 
 
-def _doubt(surface: Any) -> float:
-    """What rounding may add to a chord of a surface, for its layers' values, map units."""
+def _doubt(surface: Peaks | Spline) -> float:
+    """How much a chord may be too long because of rounding in the layers' values, map units."""
     if isinstance(surface, Spline):
         sizes = np.abs(surface.coefficients).max(axis=(1, 2))
     else:
@@ -157,17 +158,17 @@ def _doubt(surface: Any) -> float:
     return EPSILONS * float(np.finfo(np.float64).eps) * math.hypot(*(sizes * surface.weights))
 
 
-def _bound(problem: Problem, claim: Claim) -> kernels.Bound:
-    """The function u, the start being the origin."""
+def _potential(problem: Problem, claim: Claim) -> kernels.Potential:
+    """The function u, with the start as the origin."""
     (x, y), lattice = problem.start, claim.lattice
     corner_x, corner_y = lattice.bounds.x1_min - x, lattice.bounds.x2_min - y
-    return kernels.Bound(claim.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
+    return kernels.Potential(claim.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
 
 
 def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
-    """Room for the pieces that a cell is cut into at the surface's knots."""
-    data: Any = problem.surface.data
-    step = min(data.dx, data.dy) if hasattr(data, "dx") else math.inf
+    """Workspace for the pieces that a cell is cut into at the surface's knots."""
+    data = problem.surface.data
+    step = min(data.dx, data.dy) if isinstance(data, Spline) else math.inf
     return kernels.Cutting(
         np.empty(int(lattice.dx / step) + 4),
         np.empty(int(lattice.dy / step) + 4),
@@ -185,26 +186,26 @@ def exempt_cells(problem: Problem, claim: Claim) -> Cells:
 
 
 class Needs(NamedTuple):
-    """For each cell (ny, nx), the dual norm's bound M that it needs."""
+    """For each cell (ny, nx), how large M must be."""
 
-    proven: Array  # enough, by proof
-    likely: Array  # what nine points of the cell need
-    slope: Array  # the dual norm of du at those points
+    proven: Array  # this is proven to be enough
+    likely: Array  # this is enough at nine points of the cell
+    slope: Array  # the largest dual norm of du at those points
 
 
 def cell_needs(problem: Problem, claim: Claim, enough: float) -> Needs:
     """For each cell an M that is enough.
 
-    In each cell the dual norm of du is at most M, or every path through it is long enough by
-    the chord from there to the goal. Cells for which ``enough`` is proven are not looked at
-    any closer.
+    That is: in the cell the dual norm of du is at most M, or every path through it is long enough,
+    by the chord from there to the goal. enough : where an M as low as this is proven, no lower one
+    is looked for.
     """
     _require_fit(problem, claim)
     lattice, ground = claim.lattice, _ground(problem)
     found, likely, slope = np.empty((3, lattice.ny - 1, lattice.nx - 1))
     kernels.fill_needs(
         ground.surface,
-        _bound(problem, claim),
+        _potential(problem, claim),
         ground.goal,
         float(claim.horizon),
         exempt_cells(problem, claim),
@@ -220,12 +221,12 @@ def cell_needs(problem: Problem, claim: Claim, enough: float) -> Needs:
 def proven_norm(problem: Problem, claim: Claim, found: Array, enough: float = 0.0) -> float:
     """The least M that is proven to be enough for all cells, or ``enough`` where that is more.
 
-    found : what they need, proven; the largest are looked at closely.
+    found : (ny, nx), an M that is proven for each cell; the largest ones are improved first.
     """
     ground = _ground(problem)
     norm = kernels.least_norm(
         ground.surface,
-        _bound(problem, claim),
+        _potential(problem, claim),
         ground.goal,
         float(claim.horizon),
         np.argsort(found, axis=None)[::-1],
@@ -237,20 +238,20 @@ def proven_norm(problem: Problem, claim: Claim, found: Array, enough: float = 0.
 
 
 class End(NamedTuple):
-    """An end of all paths."""
+    """The start or the goal."""
 
-    core: Core
-    place: tuple[float, float]  # on the map
-    lifted: Array  # (2 + layers,), the start being the origin of the plane
-    doubt: float  # what rounding may add to a chord from it, map units
+    core: Core  # the cells around it
+    place: Point  # map units
+    lifted: Array  # (2 + layers,), in R^n, with the start as the origin of the plane
+    doubt: float  # how much a chord may be too long because of rounding, map units
 
 
 def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
-    """An end, and what is sure of the ground around its core.
+    """An end, and the least cost of the ground around its core.
 
-    The ground is the core and half as much again on all sides. A path of length s there, costs left
-    out, has met no cost below c - G s, c being that at the end and G the steepest slope; so to
-    a distance of d it is (c - G d / 2) d long.
+    The ground is the core, widened by half its size on all sides. Let c be the cost at the end and
+    G the steepest slope of the cost there. A path of length s, without costs, has met no cost below
+    c - G s. So at a distance of d it is at least (c - G d / 2) d long.
     """
     surface, data = problem.surface, problem.surface.data
     if not (surface.costs and isinstance(data, Spline)):
@@ -274,14 +275,14 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
 
 
 def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> float:
-    """At most distance(end, p) + factor u(p) for all p on the edge of its core, map units.
+    """A lower bound on distance(end, p) + factor u(p) for all p on its core's edge, map units.
 
-    The distance is bounded by the chord and the least cost around.
+    The distance is at least the chord times the least cost around.
     """
     core, anchor = end.core, _anchor(problem, claim, end)
     margin = kernels.margin_of_core(
         _ground(problem).surface,
-        _bound(problem, claim),
+        _potential(problem, claim),
         anchor,
         float(factor),
         core.column0,
@@ -294,11 +295,11 @@ def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> floa
 
 
 def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
-    """The bound that follows where the dual norm is at most ``norm``, map units.
+    """The lower bound that follows where the dual norm is at most ``norm``, map units.
 
-    Let a path leave the start core for the last time at p, and enter the goal core after
-    that for the first time at q. It is at least distance(start, p) + (u(q) - u(p)) / M +
-    distance(q, goal) long, or meets a cell from where it is at least (W - u(p)) / M to the goal.
+    Let a path leave the start core for the last time at p, and after that enter the goal core for
+    the first time at q. Its length is at least distance(start, p) + (u(q) - u(p)) / M +
+    distance(q, goal); or else it meets a cell that is at least (W - u(p)) / M from the goal.
     """
     surface, start, goal = _ground(problem)
     doubt = _doubt(surface)
@@ -313,15 +314,15 @@ def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
     last = edge_margin(problem, claim, end, 1.0 / norm)
     rest = min(last, claim.horizon / norm - least * doubt)
     within = first + rest - ROUNDING * (abs(first) + abs(rest))
-    # No number, where something overflowed.
+    # ``within`` is NaN where something overflowed; then the comparison is False.
     return max(min(within, detour), straight) if within > straight else straight
 
 
 def least_detour(problem: Problem, window: Bounds) -> float:
     """The least length on the plane of a path that leaves a window of the problem's bounds.
 
-    It is at least as long as the planar way by a side of the window: to the goal's mirror
-    image there.
+    Such a path touches a side of the window. So it is at least as long as the straight line from
+    the start to the mirror image of the goal at that side.
     """
     (x0, y0), (x1, y1) = problem.start, problem.goal
     outer, found = problem.bounds, math.inf
@@ -336,13 +337,13 @@ def least_detour(problem: Problem, window: Bounds) -> float:
 
 
 def require_proven(problem: Problem, claim: Claim) -> None:
-    """Prove a claim from nothing but the problem.
+    """Prove a claim from the problem alone.
 
-    Raises CertificateError, saying what cannot be proven.
+    Raises CertificateError, which says what cannot be proven.
     """
     found = cell_needs(problem, claim, claim.norm)
     norm = proven_norm(problem, claim, found.proven, claim.norm)
-    # Another machine's exponentials may differ in the last digit.
+    # On another machine exponentials may differ in the last digit.
     alike = 1.0 + 1e-3 * ROUNDING
     if not norm <= claim.norm * alike:
         raise CertificateError(
@@ -358,9 +359,10 @@ def require_proven(problem: Problem, claim: Claim) -> None:
 
 
 def proven_claim(problem: Problem, claim: Claim, found: Needs) -> Claim:
-    """The claim with the norm and the value that are proven; found : what its cells need.
+    """The claim with the norm and the value that can be proven.
 
-    Where no norm can be proven, the straight line's length in R^n is the bound.
+    found : what its cells need. Where no norm can be proven, the length of the straight line in
+    R^n is the bound.
     """
     enough = max(float(found.likely.max()) * (1.0 + CLOSE), FLATTEST)
     norm = proven_norm(problem, claim, found.proven, enough)

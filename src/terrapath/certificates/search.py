@@ -1,10 +1,10 @@
-"""Lower bounds on the length of every path: functions u that a claim can be made of.
+"""The search for lower bounds on the length of every path: functions u that prove them.
 
-A distance field solves |du| = 1 up to its own small errors. Its values as coefficients of a
-B-spline average its slopes, which never overshoots at the kinks of the cut locus, and so make
-a smooth u whose dual norm is 1 nearly everywhere. Where it is more, lengths are shrunk a little
-and the field is solved again: no shortest path crosses the cut locus, where most of the
-excess is, so this costs next to nothing at the goal.
+A distance field solves |du| = 1, up to small errors. Its values are taken as coefficients of a
+B-spline. That averages its slopes, so they never overshoot at the kinks of the cut locus, and u is
+smooth, with a dual norm of 1 nearly everywhere. Where the norm is larger, lengths are shrunk a
+little and the field is solved again. Most such places are on the cut locus, which no shortest path
+crosses, so the value at the goal falls very little.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,63 +27,65 @@ from ..validation import Array, require_positive
 from .certificate import Certificate, certify
 from .claims import Claim, Core, Needs, cell_needs
 
-# Sees each certificate; returning True stops the search.
+T = TypeVar("T", np.float64, np.bool_)
+
+# Is called with each certificate; returning True stops the search.
 Watch = Callable[[Certificate], bool | None]
 
-# Lattices tried, nodes on the longer side, the first where nothing better is asked for.
+# The lattices tried, by their nodes on the longer side. Without a target gap only the first one is.
 SIDES = (120, 240, 360, 480, 800, 1400)
 
-# Repairs of one lattice at most, before the next finer one is tried.
+# At most this many repairs are made on one lattice, before the next finer one is tried.
 REPAIRS = 3
 
-# Cells whose norm is above this are repaired. Below 1, for a norm is looked at in nine points
-# of a cell, and is more between them.
+# Cells whose norm is above this are repaired. It is below 1 because the norm is measured at nine
+# points of a cell, and is larger between them.
 TOLERATED = 0.9998
 
-# Half the side of the neighbourhood in which a repair shrinks lengths, in nodes.
+# A repair shrinks lengths at all nodes within this many rows and columns.
 REACH = 2
 
-# The search never looks at less ground than this share of the bounds' longer side.
+# The window of a search is never smaller than this share of the bounds' longer side.
 SMALLEST_WINDOW = 1e-6
 
-# The core reaches so many cells from the start.
+# A core reaches at most this many cells from its end.
 CORE = 4
 
 
 def mollified(u: Array, cap: float) -> Array:
-    """Coefficients of the spline that averages u (ny, nx), truncated at ``cap``."""
+    """Coefficients (ny + 2, nx + 2) of the spline that averages u (ny, nx), cut off at ``cap``."""
     inner = np.minimum(u, cap)
     return np.pad(inner, 1, mode="reflect", reflect_type="odd")
 
 
 def _blocked_nodes(problem: Problem, lattice: Lattice) -> npt.NDArray[np.bool_]:
-    """Nodes whose coefficients matter to no cell that a path can meet.
+    """(ny, nx), the nodes whose coefficients matter to no cell that a path can meet.
 
-    Those are the nodes that all cells of within two columns and rows are covered.
+    All cells within two columns and rows of such a node are covered by obstacles.
     """
     if not problem.free_space.has_obstacles:
         return np.zeros((lattice.ny, lattice.nx), bool)
     covered = np.pad(problem.free_space.covered_cells(lattice), 2, constant_values=True)
-    # Window of 4 x 4 cells around a node.
+    # Of the 4 x 4 cells around a node.
     return np.asarray(~_windows(~covered, 4))
 
 
 def _largest_within(values: Array, reach: int) -> Array:
     """Largest of the values (ny, nx) at most ``reach`` rows and columns away.
 
-    As SciPy's maximum_filter, which takes longer to import than to run.
+    It does the same as SciPy's maximum_filter, whose import would take longer than its work.
     """
     return np.asarray(_windows(np.pad(values, reach, mode="edge"), 2 * reach + 1))
 
 
-def _windows(values: Any, size: int) -> Any:
-    """Largest of each window of size x size, numbers or truth values."""
+def _windows(values: npt.NDArray[T], size: int) -> npt.NDArray[T]:
+    """The largest value in each window of size x size; truth values count as 0 and 1."""
     rows = sliding_window_view(values, size, axis=0).max(axis=-1)
-    return sliding_window_view(rows, size, axis=1).max(axis=-1)
+    return np.asarray(sliding_window_view(rows, size, axis=1).max(axis=-1))
 
 
 def _cores(problem: Problem, lattice: Lattice) -> tuple[Core, Core]:
-    """The cells around both ends: so many that they do not meet."""
+    """The cells around both ends; if possible so few that the cores do not meet."""
     bounds = lattice.bounds
     corner, cell = np.array([bounds.x1_min, bounds.x2_min]), np.array([lattice.dx, lattice.dy])
     ends = [(np.asarray(end) - corner) / cell for end in (problem.start, problem.goal)]
@@ -102,7 +104,7 @@ def _cores(problem: Problem, lattice: Lattice) -> tuple[Core, Core]:
 
 
 def _horizon(problem: Problem, lattice: Lattice, u: Array, core: Core) -> float:
-    """Least distance by way of the goal core's edge, as far as the nodes there tell."""
+    """The least distance from start to goal through the nodes on the goal core's edge."""
     window = np.s_[core.row0 : core.row1 + 1, core.column0 : core.column1 + 1]
     nodes = np.stack(np.meshgrid(lattice.x, lattice.y), axis=-1)[window]
     through = u[window] + near_distance(problem.surface, problem.goal, nodes)
@@ -111,16 +113,16 @@ def _horizon(problem: Problem, lattice: Lattice, u: Array, core: Core) -> float:
 
 
 def _repair_factors(found: Needs) -> Array:
-    """Factors (ny, nx) of lengths at the nodes that bring the norm of cells down."""
+    """Factors (ny, nx) on lengths at the nodes, to make the norm of cells smaller."""
     excess = np.where(found.likely > TOLERATED, found.slope / TOLERATED, 1.0)
     at_nodes = _windows(np.pad(excess, 1, mode="edge"), 2)
     return np.asarray(1.0 / _largest_within(at_nodes, REACH))
 
 
 class Search:
-    """The search for a bound on one lattice.
+    """The search for a lower bound on one lattice.
 
-    cap : distances beyond it do not matter, map units.
+    cap : larger distances do not matter, map units.
     """
 
     def __init__(self, problem: Problem, lattice: Lattice, cap: float) -> None:
@@ -152,7 +154,7 @@ class Search:
 
     @property
     def likely_norm(self) -> float:
-        """What the dual norm will be proven to be at best."""
+        """The least dual norm that a proof can reach: the largest at the points measured."""
         return float(self.needs.likely.max())
 
     def repair(self) -> None:
@@ -162,7 +164,7 @@ class Search:
         self._solve()
 
     def certify(self) -> Certificate:
-        """The certificate that the field as it is makes."""
+        """The certificate that the present field makes."""
         return certify(self.problem, self.proposal, self.needs)
 
 
@@ -173,7 +175,7 @@ def search_window(problem: Problem, length: float) -> Bounds:
     straight = math.hypot(x1 - x0, y1 - y0)
     if not math.isfinite(length) or straight == 0.0:
         return bounds
-    # An ellipse about both ends, its axes half as long as these.
+    # The path stays within an ellipse around both ends, with axes as long as these.
     major = max(length / problem.surface.least_cost, straight) * (1.0 + 1e-6)
     minor = math.sqrt(major - straight) * math.sqrt(major + straight)
     cosine, sine = (x1 - x0) / straight, (y1 - y0) / straight
@@ -192,10 +194,11 @@ def search_window(problem: Problem, length: float) -> Bounds:
 def certificates(
     problem: Problem, length: float = math.inf, *, target_gap: float = 0.0
 ) -> Iterator[Certificate]:
-    """Ever better certificates, from ever finer lattices.
+    """Certificates from ever finer lattices.
 
-    length : of a path that is known, map units. A lattice is given up for the next finer one
-    when its norm takes no more than a quarter of the target gap, or repairs gain little.
+    length : of a path that is known, map units. target_gap : of the lower bound. The search goes
+    on to the next finer lattice when the norm is too large by at most a quarter of the target
+    gap, or when a repair gains little.
     """
     window = search_window(problem, length)
     cap = length * (1.0 + 1e-6)
@@ -223,16 +226,17 @@ def lower_bound(
 ) -> Certificate:
     """A proven lower bound on the length of every path from start to goal.
 
-    length : of a path that is known, map units; it lets the search leave out ground that no
-    shorter path can visit. target_gap : (length - bound) / bound at which to stop; by default
-    the search stops after the first, coarsest lattice. time_limit : seconds, looked at between
-    lattices. watch : called with each certificate; returning True stops the search.
-    Where no path is known, or none exists, the search stops after the first lattice, too.
-    Returns the best certificate found, which compares with numbers as its value.
+    length : of a path that is known, map units. With it the search leaves out ground that no
+    shorter path can visit. target_gap : the search stops when (length - bound) / bound is no more
+    than this; by default, and where no path is known, it stops after the first, coarsest lattice.
+    time_limit : seconds, checked between lattices. watch : is called with each certificate;
+    returning True stops the search.
+    Returns the best certificate found, which compares with numbers by its value.
+    Raises InputError for numbers that are not above 0.
     """
     _check(length, target_gap, time_limit)
     deadline = time.perf_counter() + (math.inf if time_limit is None else time_limit)
-    # What is no number proves nothing, and so needs no warning.
+    # Overflow makes NaN, which proves nothing; so it needs no warning.
     with np.errstate(all="ignore"):
         known = known_length(problem) if length is None else length
         return _best(problem, known, target_gap, deadline, watch)
@@ -245,12 +249,12 @@ def _best(
     deadline: float,
     watch: Watch | None,
 ) -> Certificate:
-    """The best certificate found when there is reason to stop."""
+    """The best certificate found until there is a reason to stop."""
     best: Certificate | None = None
     for found in certificates(problem, length, target_gap=target_gap or 0.0):
         if best is None or found.value > best.value:
             best = found
-        # Where no path is known, no bound comes close to its length.
+        # Without a known length there is no gap to reach.
         if target_gap is None or math.isinf(length):
             break
         if length - best.value <= target_gap * best.value:
@@ -271,7 +275,7 @@ def _check(length: float | None, target_gap: float | None, time_limit: float | N
 
 
 def known_length(problem: Problem) -> float:
-    """Length of some path, map units; infinite where none is found quickly."""
+    """The length of some path, map units; infinite where none is found on a coarse lattice."""
     spacing = max(problem.bounds.width, problem.bounds.height) / SIDES[0]
     lattice = Lattice.spanning(problem.bounds, spacing)
     medium = Medium.of_surface(problem.surface, lattice, problem.free_space)

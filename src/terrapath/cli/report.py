@@ -61,7 +61,7 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
     unit = problem.surface.unit
     yield "true length", _amount(length, unit)
     if solution.lower_bound is not None and solution.gap is not None:
-        yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bounded}"
+        yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bound_in_words}"
         yield "gap", _gap(solution.gap, target_gap)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
@@ -109,7 +109,7 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     if corridor is None:
         return
     around = _amount(corridor.half_width, unit)
-    coarse = _amount(corridor.coarse.length, unit)
+    coarse = _amount(corridor.coarse_length, unit)
     yield (
         "corridor",
         f"{around} on both sides of a route of {coarse}, planned on the map read "
@@ -175,7 +175,10 @@ def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
         yield "steepest ground", f"{problem.max_slope:g} degrees"
     # In a corridor the area is the corridor's, which is told already.
     if problem.keep_in is not None and solution.corridor is None:
-        yield "keep-in area", f"{problem.keep_in.area:,.6g} {unit}^2" if unit else "given"
+        import shapely
+
+        area = shapely.union_all(problem.keep_in).area
+        yield "keep-in area", f"{area:,.6g} {unit}^2" if unit else "given"
 
 
 def _print_table(rows: Iterable[tuple[str, str]]) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,35 +14,42 @@ from .._kernels.distance import calendar_queue, dependents, descent, eikonal as 
 from .._kernels.surface.metric_rows import ROWS, columns_of
 from ..errors import InputError, OutsideSurfaceError
 from ..problem import Path, Problem
+from ..space.constraints import Area
 from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import Lattice
 from ..surface import Surface
-from ..validation import Array, as_array, as_point, as_points
+from ..validation import Array, PointLike, as_array, as_point, as_points
 from .source import SEED_RADIUS, SourceModel, model_source, near_distance, window_radius
 
-# A bucket of the queue is this share of a node's spacing, over the nodes of a side.
+# The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
 BUCKET_SHARE = 4.0
 BUCKETS = 2**14
 
-# Nodes settled between two looks at the callback and Ctrl-C.
+# Nodes settled between two checks of the callback and of Ctrl-C.
 CHUNK = 100_000
 
-# Steps of a path back to the source, in nodes.
+# The length of a step on a path back to the source, in nodes.
 STEP = 0.5
 
-# Vectors of stencils are kept in 16 bits.
+# The vectors of stencils are stored in 16 bits.
 LONGEST_SIDE = 2**15 - 1
-# Each is read by 6 + 8 others at most on average, and these are numbered by 31 bits.
+# On average a node has at most 6 + 8 dependents, and all these are numbered in 31 bits.
 MOST_NODES = (2**31 - 1) // 14
 
-# Sees how many nodes are settled; returning True stops the march.
+# The nodes of a lattice as kernels store them, (ny * nx,) of ``stencils.NODE``.
+Nodes = npt.NDArray[np.void]
+
+# Is called with the number of nodes settled so far; returning True stops the march.
 Watch = Callable[[int], bool | None]
 
 
 class Medium:
-    """A metric on a lattice, laid out for fast marching from any source."""
+    """A metric on a lattice, prepared for fast marching from any source.
 
-    def __init__(self, lattice: Lattice, nodes: Any, typical_cost: float = 1.0) -> None:
+    nodes : the stencil of each node. typical_cost : of the surface, a factor on lengths.
+    """
+
+    def __init__(self, lattice: Lattice, nodes: Nodes, typical_cost: float = 1.0) -> None:
         self.lattice = lattice
         self.nodes = nodes
         self.typical_cost = typical_cost
@@ -54,28 +60,35 @@ class Medium:
         cls, surface: Surface, lattice: Lattice, free_space: FreeSpace | None = None
     ) -> Medium:
         """The metric h of a surface; no link between nodes touches an obstacle."""
-        nodes = _lay(surface, lattice)
+        nodes = _surface_stencils(surface, lattice)
         if free_space is not None and free_space.has_obstacles:
             stencils.cut_links(free_space.data, lattice.data, nodes)
         return cls(lattice, nodes, surface.typical_cost)
 
     @classmethod
     def around(cls, surface: Surface, lattice: Lattice, blocked: npt.NDArray[np.bool_]) -> Medium:
-        """The metric h of a surface; only the ``blocked`` nodes (ny, nx) are left out."""
-        nodes = _lay(surface, lattice)
+        """The metric h of a surface; links may touch obstacles, but ``blocked`` nodes are left out.
+
+        blocked : (ny, nx).
+        """
+        nodes = _surface_stencils(surface, lattice)
         if blocked.any():
             stencils.block_nodes(lattice.data, blocked.ravel().astype(np.uint8), nodes)
         return cls(lattice, nodes, surface.typical_cost)
 
     def shrink(self, factors: Array) -> None:
-        """Multiply lengths at the nodes by factors (ny, nx), for good."""
+        """Multiply lengths at the nodes by factors (ny, nx). This changes the medium itself."""
         scale = 1.0 / np.square(np.asarray(factors, np.float64).ravel())
         for rho in ("rho0", "rho1", "rho2"):
             self.nodes[rho] *= scale
 
     @classmethod
-    def of_tensors(cls, tensors: Any, lattice: Lattice) -> Medium:
-        """Any Riemannian metric: tensors (ny, nx, 3) hold h11, h12, h22 at the nodes."""
+    def of_tensors(cls, tensors: npt.ArrayLike, lattice: Lattice) -> Medium:
+        """Any Riemannian metric.
+
+        tensors : (ny, nx, 3), h11, h12 and h22 at the nodes. Raises InputError where one is not
+        positive definite.
+        """
         given = as_array(tensors, "tensors", shape=(lattice.ny, lattice.nx, 3))
         if not (given[..., 0] * given[..., 2] > given[..., 1] ** 2).all():
             raise InputError("tensors hold one that is not positive definite; check their order")
@@ -85,12 +98,12 @@ class Medium:
 
     def _dependents(self) -> dependents.Dependents:
         nx, first = self.lattice.nx, np.zeros(len(self.nodes) + 1, np.int32)
-        # Each node's dependents are counted in the place after its own, and become their places.
+        # The number of a node's dependents is stored one place after the node, and then summed up.
         dependents.note_dependents(self.nodes, nx, first[1:], np.empty(0, np.uint32))
         np.cumsum(first, dtype=np.int32, out=first)
         entries = np.empty(first[-1], np.uint32)
         dependents.note_dependents(self.nodes, nx, first, entries)
-        first[1:] = first[:-1]  # each was moved to its end, where the next begins
+        first[1:] = first[:-1]  # each now points to its end, where the next begins
         first[0] = 0
         return dependents.Dependents(first, entries)
 
@@ -99,7 +112,8 @@ class Medium:
     ) -> Array:
         """Distances (ny, nx) from the source, map units; infinite where not reached.
 
-        limit : nodes farther than this are not settled, map units.
+        limit : nodes farther than this are not settled, map units. watch : is called now and then
+        with the number of nodes settled; returning True stops the march.
         """
         lattice = self.lattice
         source = kernels.Source(*model[:5])
@@ -150,15 +164,15 @@ class Medium:
                 return
 
 
-def _lay(surface: Surface, lattice: Lattice) -> Any:
-    """The stencils of the metric h."""
+def _surface_stencils(surface: Surface, lattice: Lattice) -> Nodes:
+    """Nodes with the stencils of the metric h."""
     nodes, grid = _allocate(lattice), lattice.data
     columns, row = columns_of(surface.data, grid), np.empty((ROWS, lattice.nx))
     stencils.lay_surface_stencils(surface.data, grid, columns, row, nodes)
     return nodes
 
 
-def _allocate(lattice: Lattice) -> Any:
+def _allocate(lattice: Lattice) -> Nodes:
     sides, count = (lattice.nx, lattice.ny), lattice.nx * lattice.ny
     if max(sides) > LONGEST_SIDE or count > MOST_NODES:
         raise InputError(
@@ -172,8 +186,10 @@ def _allocate(lattice: Lattice) -> Any:
 class DistanceField:
     """Distances under h from one source, at the nodes of a lattice.
 
-    values : (ny, nx), map units, infinite where no path was found on the lattice.
-    problem : what was asked for, where a problem from the source to itself was made of it.
+    surface, free_space : where distances are measured. source : (x1, x2), map units. medium : the
+    metric on the lattice. values : (ny, nx), map units, infinite where no path was found on the
+    lattice. problem : from the source to itself, with the constraints that were asked for; None
+    where the field was not made from a problem.
     """
 
     surface: Surface
@@ -188,13 +204,14 @@ class DistanceField:
         """Where the values lie."""
         return self.medium.lattice
 
-    def at(self, points: Any) -> Array:
-        """Distances from the source to points (..., 2), map units; infinite where not reached.
+    def at(self, points: npt.ArrayLike) -> Array:
+        """Distances (...) from the source to points (..., 2), map units; infinite if not reached.
 
-        Cubic where the field is smooth. At a kink, where shortest paths from two sides meet,
-        and near obstacles, the least distance by way of the places around that can be seen.
-        So at a node on a kink the answer is a little more, and nearer the truth, than
-        ``values``. Raises OutsideSurfaceError where a point is outside the bounds.
+        The field is interpolated by cubics where it is smooth. At a kink, where shortest paths
+        from two sides meet, and near obstacles, the value is the least distance over the nodes
+        nearby that a free segment leads to. At a node on a kink it is a little higher than in
+        ``values``, and more accurate.
+        Raises OutsideSurfaceError where a point is outside the bounds.
         """
         array = as_points(points)
         flat = np.ascontiguousarray(array.reshape(-1, 2))
@@ -231,22 +248,22 @@ class DistanceField:
         starts = np.broadcast_to(np.asarray(self.source), points.shape)
         return self.free_space.segments_are_free(starts, points)
 
-    def path_to(self, goal: Any) -> Path | None:
-        """The path down the field from the source to a goal; None where there is none.
+    def path_to(self, goal: PointLike) -> Path | None:
+        """The path from the source to a goal (x1, x2), map units; None where there is none.
 
-        Steepest descent under h where the field is smooth and the way is free; otherwise from
-        place to place, each the best of those around that can be seen.
+        It follows steepest descent under h where the field is smooth and the ground is free.
+        Elsewhere it goes to the best node nearby that a free segment leads to.
         Raises OutsideSurfaceError where the goal is outside the bounds.
         """
         end = np.array([as_point(goal, "goal")])
         distance = float(self.at(end)[0])
         if not math.isfinite(distance):
             return None
-        # No shortest path is longer on the plane than its length over the least cost; where it is
-        # longest against the nodes it still visits each but a few times.
+        # On the plane, no shortest path is longer than its length over the least cost; and it
+        # visits each node only a few times.
         farthest = distance / self.surface.least_cost / min(self.lattice.dx, self.lattice.dy)
-        room = min(1.2 * farthest / STEP, 4.0 * self.values.size / STEP)
-        points = np.empty((int(room) + 16, 2))
+        most = min(1.2 * farthest / STEP, 4.0 * self.values.size / STEP)
+        points = np.empty((int(most) + 16, 2))
         points[0] = end[0]
         count = descent.trace(self.surface.data, self.free_space.data, self._field, STEP, points)
         return Path(self.surface, points[:count][::-1].copy()) if count else None
@@ -266,7 +283,10 @@ def march_from(
     limit: float = math.inf,
     watch: Watch | None = None,
 ) -> DistanceField:
-    """The distance field of one source through a medium that is laid out already."""
+    """The distance field of one source in a medium that is prepared already.
+
+    limit, watch : as of ``Medium.march``.
+    """
 
     def is_visible(points: Array) -> npt.NDArray[np.bool_]:
         starts = np.broadcast_to(np.asarray(source), points.shape)
@@ -285,13 +305,13 @@ def march_from(
 
 def distance_field(
     surface: Surface,
-    start: Any,
+    start: PointLike,
     *,
-    bounds: Any = None,
+    bounds: Sequence[float] | None = None,
     obstacles: Iterable[Obstacle] = (),
     radius: float = 0.0,
     max_slope: float | None = None,
-    keep_in: Any = None,
+    keep_in: Area | None = None,
     spacing: float | None = None,
     watch: Watch | None = None,
 ) -> DistanceField:
@@ -299,9 +319,9 @@ def distance_field(
 
     start : (x1, x2), map units, in free space.
     bounds, obstacles, radius, max_slope, keep_in : as of ``Problem``.
-    spacing : of the nodes, map units; by default a 250th of the region's
-    longer side, or a cell of a finer map.
-    watch : now and then called with the number of settled nodes; returning True stops.
+    spacing : of the nodes, map units; by default a 250th of the region's longer side, or a cell
+    of the map where that is less.
+    watch : is called now and then with the number of nodes settled; returning True stops the march.
     Raises OutsideSurfaceError or InputError, naming the value and the remedy.
     """
     problem = Problem(

@@ -1,4 +1,4 @@
-"""The distance from a source nearby, in closed form, where a lattice alone knows least of it."""
+"""The distance near a source, in closed form: there the lattice alone is least accurate."""
 
 from __future__ import annotations
 
@@ -13,33 +13,34 @@ from ..space.lattice import Lattice
 from ..surface import Surface, metric
 from ..validation import Array
 
-# Nodes this near to the source, in nodes, take the source model's value.
+# Nodes within this distance of the source, in nodes, take the source model's value.
 SEED_RADIUS = 3.0
-# Differences are factored by the source model this far around the source, in nodes, or as far
-# as the surface has one feature, for the model knows no more.
+# Differences are factored by the source model within this distance of the source, in nodes, or
+# within two features of the surface where that is less: the model does not hold beyond.
 WINDOW_RADIUS = 16
 
 Nodes = npt.NDArray[np.int64]
 
 
 class SourceModel(NamedTuple):
-    """The distance from the source nearby, as far as it is known in closed form."""
+    """The distance from the source in closed form, on a window of nodes around it."""
 
-    row: int
-    column: int
-    values: Array  # (rows, columns), map units, NaN where it does not hold
-    slope_x: Array  # per node
-    slope_y: Array
-    seeds: Nodes  # node numbers
-    seed_values: Array  # map units
+    row: int  # of the lattice: the window's first
+    column: int  # likewise
+    values: Array  # (rows, columns), map units, NaN where the model does not hold
+    slope_x: Array  # (rows, columns), of the distance along x1, map units per node
+    slope_y: Array  # (rows, columns), along x2
+    seeds: Nodes  # (k,), numbers of the nodes that take the model's value
+    seed_values: Array  # (k,), map units
 
 
 def near_distance(surface: Surface, source: tuple[float, float], points: Array) -> Array:
-    """Distance under h from a source to points (..., 2) nearby, map units.
+    """Distance (...) under h from a source to points (..., 2) nearby, map units.
 
-    The square of a geodesic's length is that of its chord c plus |II(c, c)|^2 / 12, II being
-    the second fundamental form, here at the middle: the relative error is of fourth order.
-    A cost multiplies it by its mean along the chord, but for what bending aside saves.
+    The square of a geodesic's length is that of its chord c plus |II(c, c)|^2 / 12. II is the
+    second fundamental form, taken in the middle; so the relative error is of fourth order.
+    Costs multiply the length by their mean along the chord, minus what a path saves by bending
+    to cheaper ground.
     """
     offsets = points - np.asarray(source)
     middle = np.asarray(source) + 0.5 * offsets
@@ -54,7 +55,7 @@ def near_distance(surface: Surface, source: tuple[float, float], points: Array) 
     )
     normal = np.square(bends).sum(-1) - np.einsum("...i,...ij,...j->...", pull, inverse, pull)
     squared = np.square(chords).sum(-1)
-    # On rough ground the formula knows nothing past the next bump: then it adds little.
+    # On rough ground the formula fails beyond the next bump, so what it adds is limited.
     squared += np.minimum(np.maximum(normal, 0.0) / 12.0, 0.05 * squared)
     distance = np.asarray(np.sqrt(squared))
     return distance * _mean_cost(surface, source, points, inverse) if surface.costs else distance
@@ -63,11 +64,11 @@ def near_distance(surface: Surface, source: tuple[float, float], points: Array) 
 def _mean_cost(
     surface: Surface, source: tuple[float, float], points: Array, inverse: Array
 ) -> Array:
-    """What the cost multiplies distances to points (..., 2) nearby by.
+    """The factor (...) of the cost on distances to points (..., 2) nearby.
 
-    Simpson's mean along the chord; where the cost's logarithm has the slope g across the way,
-    bending aside saves g^2 d^2 / 24 of it. inverse (..., 2, 2) : of h in the middle, costs
-    left out.
+    It is Simpson's mean of the cost along the chord, of length d. Where the logarithm of the cost
+    has the slope g across the chord, bending to cheaper ground saves the share g^2 d^2 / 24.
+    inverse : (..., 2, 2), of h in the middle, without costs.
     """
     offsets = points - np.asarray(source)
     middle = np.asarray(source) + 0.5 * offsets
@@ -76,8 +77,8 @@ def _mean_cost(
     ) / 6
     slope = surface.log_cost_jets(middle)[..., 1:3]
     squared = np.einsum("...i,...ij,...j->...", offsets, np.linalg.inv(inverse), offsets)
-    steepness = np.einsum("...i,...ij,...j->...", slope, inverse, slope)
-    saved = (steepness * squared - np.square((slope * offsets).sum(-1))) / 24.0
+    squared_slope = np.einsum("...i,...ij,...j->...", slope, inverse, slope)
+    saved = (squared_slope * squared - np.square((slope * offsets).sum(-1))) / 24.0
     return np.asarray(mean * (1.0 - np.clip(saved, 0.0, 0.05)))
 
 
@@ -88,7 +89,7 @@ def model_source(
     distance: Callable[[Array], Array],
     is_visible: Callable[[Array], npt.NDArray[np.bool_]] | None = None,
 ) -> SourceModel:
-    """The model on all nodes within ``radius`` nodes of the source, in rows and columns.
+    """The model on all nodes at most ``radius`` rows and columns from the source.
 
     distance : points (..., 2) -> (...), map units. is_visible : points (m, 2) -> (m,) bool.
     """
@@ -112,7 +113,7 @@ def model_source(
 
 def _slope(distance: Callable[[Array], Array], points: Array, lattice: Lattice, axis: int) -> Array:
     """Derivative of the distance along an axis, per node, by central differences."""
-    nodes = 1e-4  # near enough, and far above rounding
+    nodes = 1e-4  # small, and far above rounding
     step = np.zeros(2)
     step[axis] = nodes * (lattice.dx, lattice.dy)[axis]
     bounds = lattice.bounds
@@ -123,6 +124,6 @@ def _slope(distance: Callable[[Array], Array], points: Array, lattice: Lattice, 
 
 
 def window_radius(surface: Surface, lattice: Lattice) -> float:
-    """How far around the source its model is used, in nodes."""
+    """Within how many nodes of the source its model is used."""
     features = 2.0 * surface.resolution / max(lattice.dx, lattice.dy)
     return min(max(features, SEED_RADIUS + 1.0), WINDOW_RADIUS)

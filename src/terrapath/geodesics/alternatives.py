@@ -1,4 +1,4 @@
-"""Distinct locally shortest routes: which side of which peak or obstacle."""
+"""Distinct locally shortest routes; they pass peaks and obstacles on different sides."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from ..space.lattice import Lattice
 from ..validation import Array, require_count, require_positive
 from .refinement import refine
 
-# Nodes are candidates to lead a route through where their detour is least within this share
-# of the region's side.
+# A node is a candidate for a route to pass through where the length of that route is least within
+# this share of the region's side.
 NEIGHBOURHOOD = 1.0 / 40.0
 
-# Routes more than so many times as long as the shortest are of no interest.
+# Routes more than this many times as long as the shortest are left out.
 LONGEST = 1.5
 
-# Candidates traced and refined for each route that is asked for.
+# At most this many candidates are tried for each route that is asked for.
 TRIES = 6
 
-# Routes are the same where they are nowhere farther apart than this share of the region's side,
-# or end up equally long and nowhere farther apart than a neighbourhood.
+# Two routes are the same if they are nowhere farther apart than this share of the region's side;
+# or if they are equally long, and nowhere farther apart than a neighbourhood.
 SAME_PLACE = 1e-3
 SAME_LENGTH = 1e-7
 
-# Places along a route that are compared with another one.
+# Two routes are compared at this many places.
 LOOKS = 65
 
 
@@ -39,11 +39,13 @@ def alternatives(
 ) -> tuple[Path, ...]:
     """The distinct locally shortest routes from start to goal, each refined, shortest first.
 
-    count : at most so many. spacing : of the nodes that routes are searched on, map units; by
-    default a 250th of the region's longer side, or a cell of a finer map.
-    A route is led through a node off the routes found before, where the sum of the distances
-    from start and goal is least. Empty where no route was found on the nodes. One that cannot be
-    refined is left out, with a warning; the error is raised only where none can be.
+    count : the most routes to return. spacing : of the nodes on which routes are searched, map
+    units; by default a 250th of the region's longer side, or a cell of the map where that is less.
+
+    Each further route passes through a node away from the routes found before, where the sum of the
+    distances to start and goal is least. The tuple is empty where no route was found. A route that
+    cannot be refined is left out, with a warning; where none can be, the error is raised.
+    Raises InputError for a count or a spacing that is not above 0.
     """
     require_count(count=count)
     if spacing is not None:
@@ -66,7 +68,7 @@ def alternatives(
 
 
 def shortest(routes: Iterable[Path], count: int) -> tuple[Path, ...]:
-    """So many of the routes at most, shortest first."""
+    """The ``count`` shortest of the routes, shortest first."""
     return tuple(sorted(routes, key=lambda route: route.length)[:count])
 
 
@@ -79,11 +81,11 @@ def routes_of_fields(
     failed: Callable[[Exception], object],
     must_stop: Callable[[], bool] | None = None,
 ) -> Iterator[Path]:
-    """Distinct routes as they are refined, the way down the fields first, the others in no order.
+    """Distinct routes, each as soon as it is refined; the path down the fields comes first.
 
-    from_start, from_goal : distance fields on one lattice. count : routes that are asked for;
-    more are looked for, since a later one may be shorter. failed : told why a route could not
-    be refined. must_stop : looked at after each candidate; it may end the search.
+    from_start, from_goal : distance fields on one lattice. count : routes that are asked for; more
+    are tried, because a later one may be shorter. failed : is called with the error where a
+    route cannot be refined. must_stop : is asked after each candidate whether to end the search.
     """
     found: list[Path] = []
     for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
@@ -102,7 +104,7 @@ def routes_of_fields(
 def _candidates(
     problem: Problem, from_start: DistanceField, from_goal: DistanceField
 ) -> Iterator[Path]:
-    """Routes through the nodes with the least detours, each off all that came before."""
+    """Routes through the nodes of least detour, each away from all routes before it."""
     direct = from_start.path_to(problem.goal)
     if direct is None:
         return
@@ -141,7 +143,7 @@ def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:
 def _lead_through(
     problem: Problem, from_start: DistanceField, from_goal: DistanceField, point: Array
 ) -> Path | None:
-    """The shortest path that visits a point."""
+    """The shortest path through a point."""
     first, second = from_start.path_to(point), from_goal.path_to(point)
     if first is None or second is None:
         return None
@@ -157,7 +159,7 @@ def _is_same(problem: Problem, a: Path, b: Path) -> bool:
 
 
 def _stay_together(a: Path, b: Path, distance: float) -> bool:
-    """Is neither path farther than a distance from the other, as far as LOOKS places tell?"""
+    """Is neither path, at LOOKS places, farther than a distance from the other?"""
     shares = np.linspace(0.0, 1.0, LOOKS)
     return all(
         bool(

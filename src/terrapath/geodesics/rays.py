@@ -1,4 +1,4 @@
-"""Geodesics of h: the equation's coefficients, the exponential map, and its derivative."""
+"""Geodesics of h: the equation's coefficients, rays, the exponential map and its derivative."""
 
 from __future__ import annotations
 
@@ -8,25 +8,26 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .._kernels.geodesics import equation as kernels, rays
 from ..errors import InputError
 from ..surface import Surface
 from ..surface.bounds import Bounds
 from ..surface.metric import inverse_metric_tensor, metric_tensor
-from ..validation import Array, as_array, as_point, require_positive
+from ..validation import Array, PointLike, as_array, as_point, require_positive
 
-# Largest error of a step: of positions as a share of two features of the surface (1 in the
-# paper's scenes), of the unit speed, and of the Jacobi field relative to itself.
+# The largest error of a step: in positions, as a share of two features of the surface (that is 1 in
+# the paper's scenes); in the unit speed; and in the Jacobi field, relative to itself.
 TOLERANCE = 1e-11
 
-# Rows of a ray: four are a step on the smoothest ground, thousands on a rough raster.
+# The most rows of a ray. A ray takes a few steps on smooth ground, and thousands on a rough raster.
 MOST_STEPS = 200_000
 
 EVERYWHERE = Bounds(-math.inf, -math.inf, math.inf, math.inf)
 
 
-def christoffel_symbols(surface: Surface, points: Any) -> Array:
+def christoffel_symbols(surface: Surface, points: npt.ArrayLike) -> Array:
     """Christoffel symbols of h at points.
 
     points : (..., 2), map units. Returns (..., 2, 2, 2), index order [k, i, j], 1/map unit.
@@ -38,10 +39,11 @@ def christoffel_symbols(surface: Surface, points: Any) -> Array:
     return symbols.reshape(*shape, 2, 2, 2)
 
 
-def gaussian_curvature(surface: Surface, points: Any) -> Array:
+def gaussian_curvature(surface: Surface, points: npt.ArrayLike) -> Array:
     """Gaussian curvature of the surface above points (..., 2), 1/map unit^2.
 
-    From the equation of Gauss, for any number of layers (do Carmo 1992, chapter 6).
+    Returns (...). By the equation of Gauss, for any number of layers (do Carmo 1992, chapter 6).
+    Raises OutsideSurfaceError where a point is off the surface.
     """
     flat, shape = surface._points(points)
     curvatures = np.empty(len(flat))
@@ -49,12 +51,14 @@ def gaussian_curvature(surface: Surface, points: Any) -> Array:
     return curvatures.reshape(shape)
 
 
-def geodesic_acceleration(surface: Surface, points: Any, velocities: Any) -> Array:
+def geodesic_acceleration(
+    surface: Surface, points: npt.ArrayLike, velocities: npt.ArrayLike
+) -> Array:
     """x'' = -h^-1 sum_k w_k^2 grad x_k (x'^T Hess x_k x') at points with velocities, (..., 2).
 
-    The geodesic equation without a single Christoffel symbol; the same as the appendix's
-    -Gamma(x', x'), against which it is tested. The slope p of the log of a cost adds
-    -2 (p . x') x' + H(x', x') H^-1 p, H being the metric without it.
+    It equals -Gamma(x', x') of the paper's appendix, without the Christoffel symbols. Let p be the
+    slope of the logarithm of the cost, and H the metric without costs. The cost adds
+    -2 (p . x') x' + H(x', x') H^-1 p. Returns (..., 2).
     """
     v = np.asarray(velocities, np.float64)
     gradients, hessians = surface.gradients(points), surface.hessians(points)
@@ -73,10 +77,10 @@ def geodesic_acceleration(surface: Surface, points: Any, velocities: Any) -> Arr
 class Ray:
     """A geodesic of unit speed from a point, sampled at the integrator's steps.
 
-    angle : radians on the plane. arc_length : (m,), map units. points : (m, 2).
-    velocities : (m, 2), of length 1 under h. jacobi : (m,), how far the point at that arc
-    length moves, map units under h, to the left of the ray, per radian of the angle.
-    left_surface : it ended at the edge of the bounds.
+    angle : at the start, radians on the plane. arc_length : (m,), map units. points : (m, 2),
+    map units. velocities : (m, 2), of length 1 under h. jacobi : (m,), how far the point moves to
+    the left of the ray, map units under h, per radian of the angle. jacobi_slope : (m,), its
+    derivative by arc length. left_surface : did the ray end at the edge of the bounds?
     """
 
     angle: float
@@ -94,14 +98,14 @@ class Ray:
 
     @property
     def leaves_at_once(self) -> bool:
-        """Does it start on the edge and lead outwards? Its start is all there is of it then."""
+        """Does the ray start on the edge and lead outwards? Then it consists of its start alone."""
         return len(self.arc_length) == 1
 
     @property
     def position(self) -> Callable[..., Array]:
         """Position by arc length between the steps (cubic Hermite).
 
-        As SciPy's curves, it gives its derivatives, too: ``position(s, 1)`` is the velocity.
+        Like SciPy's curves it also gives derivatives: ``position(s, 1)`` is the velocity.
         """
         from scipy.interpolate import CubicHermiteSpline, PPoly
 
@@ -114,7 +118,7 @@ class Ray:
 
     @property
     def conjugate_points(self) -> Array:
-        """Arc lengths at which the end is conjugate to the start: j = 0 again."""
+        """Arc lengths of the points conjugate to the start, where the Jacobi field is 0."""
         from scipy.interpolate import CubicHermiteSpline
 
         if self.leaves_at_once:
@@ -126,7 +130,7 @@ class Ray:
 
 def trace_ray(
     surface: Surface,
-    start: Any,
+    start: PointLike,
     angle: float,
     length: float,
     *,
@@ -136,9 +140,10 @@ def trace_ray(
 ) -> Ray:
     """Follow the geodesic that leaves ``start`` at ``angle`` (radians on the plane).
 
-    length : map units. bounds : where to end; by default the surface's. longest_step : map
-    units, for samples that lie at least so close. tolerance : of the error in each step.
-    Raises InputError where the surface is too rough to be followed.
+    start : (x1, x2), map units. length : map units. bounds : the ray ends at their edge; by default
+    the surface's. longest_step : the largest distance of samples, map units. tolerance : the
+    largest error of a step.
+    Raises InputError where the surface is too rough to follow the geodesic.
     Source: paper, appendix 6.1; Dormand and Prince 8(5, 3).
     """
     require_positive(length=length, tolerance=tolerance)
@@ -184,17 +189,18 @@ def trace_ray(
 
 
 def _length_unit(surface: Surface, length: float) -> float:
-    """The length that errors of positions are held against, map units."""
+    """The length that errors of positions are relative to, map units."""
     return min(2.0 * surface.resolution, length)
 
 
 def exponential_map(
-    surface: Surface, start: Any, vectors: Any, *, tolerance: float = TOLERANCE
+    surface: Surface, start: PointLike, vectors: npt.ArrayLike, *, tolerance: float = TOLERANCE
 ) -> Array:
     """Ends of the geodesics that leave ``start`` with the given velocities after unit time.
 
-    vectors : (m, 2), map units, on the plane. Returns (m, 2).
-    Raises InputError with the vector where a geodesic leads over the edge of the surface.
+    start : (x1, x2), map units. vectors : (m, 2), map units, on the plane. tolerance : the
+    largest error of a step. Returns (m, 2), map units.
+    Raises InputError, which names the vector, where a geodesic leads over the surface's edge.
     """
     base = np.asarray(as_point(start, "start"))
     velocities = as_array(vectors, "vectors", shape=(None, 2))
@@ -221,9 +227,10 @@ def exponential_map(
 class Geodesic:
     """A geodesic from start to goal.
 
-    angle : radians on the plane at the start. length : exact arc length, map units.
-    points : (m, 2). jacobi_at_goal : how far the end moves, map units per radian.
-    conjugate_points : arc lengths; a geodesic is locally shortest only without one.
+    angle : at the start, radians on the plane. length : exact arc length, map units.
+    points : (m, 2), map units. jacobi_at_goal : how far the end moves, map units per radian of the
+    angle. conjugate_points : arc lengths, map units; a geodesic is locally shortest only where
+    there are none.
     """
 
     angle: float
@@ -244,10 +251,10 @@ class Miss:
     """Where a ray comes closest to a target."""
 
     ray: Ray
-    arc_length: float
-    distance: float  # on the plane, map units
-    side: float  # signed distance: above 0 where the target lies to the left
-    speed: float  # on the plane, of the ray there: map units a unit of arc length
+    arc_length: float  # map units
+    distance: float  # from the target on the plane, map units
+    side: float  # the distance with a sign: above 0 where the target lies to the left
+    speed: float  # of the ray there, on the plane: map units per unit of arc length
 
 
 SAMPLES_PER_STEP = 8
@@ -283,7 +290,7 @@ POLISHING_STEPS = 4
 
 @dataclass
 class _Bracket:
-    """Two angles between which a geodesic passes the goal from one side to the other."""
+    """Two angles; the geodesics at them pass the goal on different sides."""
 
     low: float
     high: float
@@ -302,10 +309,10 @@ class _Bracket:
 
 
 def is_bracket(low: Miss, high: Miss) -> bool:
-    """Do two neighbouring rays pass the target on two sides, and near the same place?
+    """Do two neighbouring rays pass the target on different sides, near the same place?
 
-    Where the field of rays is torn, as behind a peak that they pass on two sides, their
-    closest approaches lie farther apart along the rays than across them.
+    Rays may part, as on the two sides of a peak. Then the places where they come closest lie
+    farther apart along the rays than across them.
     """
     apart = abs(low.arc_length - high.arc_length) * max(low.speed, high.speed)  # on the plane
     leaves = min(low.arc_length, high.arc_length) > 0.0  # some ray leads towards the target
@@ -315,18 +322,19 @@ def is_bracket(low: Miss, high: Miss) -> bool:
 
 def hit(
     surface: Surface,
-    start: Any,
-    goal: Any,
+    start: PointLike,
+    goal: PointLike,
     between: tuple[Miss, Miss],
     *,
     bounds: Bounds,
     tolerance: float = TOLERANCE,
 ) -> Geodesic | None:
-    """The geodesic between two rays, the goal on either side, that ends exactly at the goal.
+    """The geodesic between two rays that ends exactly at the goal; None where there is none.
 
-    Newton's method in angle and arc length, with the Jacobi field as the derivative; where it
-    does not halve the error, or leaves the bracket, the bracket is halved instead. None where
-    it holds no such geodesic.
+    start, goal : (x1, x2), map units. between : where two rays that pass the goal on different
+    sides come closest to it. tolerance : the largest error of a step. It is Newton's method for
+    angle and arc length, with the Jacobi field as the derivative. Where a step does not halve the
+    error, or leads out of the bracket of angles, the bracket is halved instead.
     """
     low, high = between
     target = np.asarray(goal, np.float64)
@@ -356,7 +364,7 @@ def hit(
 
 
 def _newton_step(surface: Surface, ray: Ray, target: Array) -> tuple[float, float, float]:
-    """Change of angle and length that moves a ray's end to the target, and the distance to it."""
+    """The changes of angle and length that move a ray's end to a target, and the distance to it."""
     end, v, j = ray.points[-1], ray.velocities[-1], float(ray.jacobi[-1])
     offset = target - end
     h = metric_tensor(surface, end)
@@ -367,7 +375,7 @@ def _newton_step(surface: Surface, ray: Ray, target: Array) -> tuple[float, floa
 
 def _geodesic(
     surface: Surface,
-    start: Any,
+    start: PointLike,
     target: Array,
     angle: float,
     length: float,
@@ -375,8 +383,9 @@ def _geodesic(
 ) -> Geodesic:
     """The final geodesic, sampled for a path.
 
-    It is followed in finer steps than the search took, and where rays spread a thousandfold
-    the two end apart by more than the tolerance: so Newton's method goes on with these steps.
+    It is followed in finer steps than those of the search. Where rays spread a thousandfold, the
+    finer ray ends elsewhere by more than the tolerance. So Newton's method goes on with the finer
+    steps.
     """
     for step in range(POLISHING_STEPS + 1):
         spacing = length / PATH_POINTS

@@ -1,4 +1,4 @@
-"""The experiments of the paper's section 5: what it printed, and how each is run here."""
+"""The experiments of the paper's section 5: the numbers it prints, and how each is run here."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .runner import Runner
 
 @dataclass(frozen=True)
 class Printed:
-    """What the paper prints for a scene. Lengths in map units."""
+    """The numbers that the paper prints for a scene. Lengths are in map units."""
 
-    rrt_star_r: float
-    geodesic: float
-    directions: int
-    chord: float
+    rrt_star_r: float  # mean of RRT*-R
+    geodesic: float  # by geodesic traversal
+    directions: int  # of that traversal
+    chord: float  # mean of the chord baseline
 
 
 PRINTED = {
@@ -31,28 +31,28 @@ PRINTED = {
     "three-peaks": Printed(15.44211, 15.37167, 400, 16.1702),
     "six-peaks": Printed(17.18928, 17.02196, 600, 19.438),
 }
-# The length that the paper's convergence experiment tends to.
+# The length to which the paper's convergence experiment converges.
 PRINTED_LIMIT = 15.12566
 CONVERGENCE_SCENE = "three-peaks"
 REPEAT_SCENES = ("repeat-3d", "repeat-4d")
 SENSITIVITY_SCENES = ("one-peak", "six-peaks")
-# The step of all experiments, map units, and those that are compared with it.
+# The step of all experiments, map units, and the steps that are compared with it.
 STEP = 1.0
 STEPS = (0.5, 1.0, 2.0, 4.0)
-# The search for the true length looks 75 degrees to either side of the goal: on repeat-4d the
+# The search for the true length covers 75 degrees to either side of the goal. On repeat-4d the
 # shortest path is outside the paper's sector, [0, 90] degrees.
 SECTOR = (-math.pi / 6.0, 2.0 * math.pi / 3.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scale:
-    """How much is run. The defaults are the paper's, where it tells them."""
+    """How many samples and runs there are. The defaults are the paper's, where it gives them."""
 
-    samples: int = 10_000
-    seeds: int = 10
-    repeats: int = 150
+    samples: int = 10_000  # of a run
+    seeds: int = 10  # runs of a planner on a scene
+    repeats: int = 150  # runs on each scene of the repeat experiment
     convergence_samples: tuple[int, ...] = tuple(range(2_000, 20_001, 2_000))
-    convergence_runs: int = 10
+    convergence_runs: int = 10  # with each number of samples
     directions: int = 4_000  # of the search for the true length, and of the sensitivity
 
 
@@ -69,9 +69,9 @@ QUICK = Scale(
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Of a run: trials take the seeds ``seed``, ``seed`` + 1, and so on."""
+    """The settings of a reproduction. Trials take the seeds ``seed``, ``seed`` + 1, and so on."""
 
-    scale: Scale = field(default=FULL)
+    scale: Scale = field(default=FULL)  # how much is run
     seed: int = 0
 
     def planner(self, run: int = 0, *, chord: bool = False, **options: Any) -> RRTStar:
@@ -85,17 +85,20 @@ class Settings:
         )
 
     def paths(self, scene: str, runs: int, **options: Any) -> list[PathTrial]:
-        """Trials that differ in their seeds alone."""
+        """Trials that differ only in their seeds."""
         return [PathTrial(scene, self.planner(run, **options)) for run in range(runs)]
 
     def truth(self, scene: str) -> FanTrial:
-        """The search for the true length: as many directions as the scale has."""
+        """The search for the true length, with the scale's number of directions."""
         planner = GeodesicTraversal(directions=self.scale.directions, sector=SECTOR)
         return FanTrial(scene, planner)
 
 
 def _check_truth(scene: str, truth: FanSummary, lengths: Iterable[float]) -> None:
-    """No path can be shorter than the shortest geodesic; one that is shows a search too coarse."""
+    """Raise InputError where a path is shorter than the shortest geodesic found.
+
+    Then the search for geodesics was too coarse.
+    """
     shortest = min(lengths)
     if shortest < truth.true_length * (1.0 - 1e-9):
         raise InputError(
@@ -106,20 +109,20 @@ def _check_truth(scene: str, truth: FanSummary, lengths: Iterable[float]) -> Non
 
 @dataclass(frozen=True)
 class StepEffect:
-    """What the planners find with another step."""
+    """What the planners find with one step."""
 
     step: float  # map units
-    rrt_star_r: list[PlannedPath]
+    rrt_star_r: list[PlannedPath]  # one for each seed
     chord: list[PlannedPath]
 
 
 @dataclass(frozen=True)
 class SceneData:
-    """A scene by RRT*-R, by its chord baseline and by traversal of geodesics."""
+    """A scene, solved by RRT*-R, by its chord baseline and by geodesic traversal."""
 
     scene: str
     printed: Printed
-    truth: FanSummary
+    truth: FanSummary  # of the search for the true length
     traversal: FanSummary  # with the paper's number of directions
     steps: list[StepEffect]  # one for each of STEPS
 
@@ -148,13 +151,13 @@ def run_scene(scene: str, settings: Settings, runner: Runner) -> SceneData:
 
 @dataclass(frozen=True)
 class ComparedPath:
-    """A path's true length under the metrics of both scenes, and what it meets."""
+    """A path's true length under the metrics of both scenes, and its profile."""
 
-    planned_on: str
+    planned_on: str  # the scene
     height_only: float  # length under h of four-peaks, map units
     with_resistance: float  # length under h of six-peaks, map units
-    highest: float  # along the path
-    most_resistance: float
+    highest: float  # height along the path
+    most_resistance: float  # along the path
 
 
 @dataclass(frozen=True)
@@ -162,8 +165,8 @@ class ComparativeData:
     """Paths planned without and with the ground's resistance."""
 
     paths: list[ComparedPath]  # every seed on four-peaks, then every seed on six-peaks
-    true_height_only: float
-    true_with_resistance: float
+    true_height_only: float  # true length on four-peaks, map units
+    true_with_resistance: float  # true length on six-peaks, map units
 
     def planned_on(self, scene: str) -> list[ComparedPath]:
         """The paths that were planned on one of the scenes."""
@@ -200,7 +203,7 @@ class RepeatData:
 
     scene: str
     lengths: list[float]  # map units
-    truth: FanSummary
+    truth: FanSummary  # of the search for the true length
 
 
 def run_repeat(settings: Settings, runner: Runner) -> list[RepeatData]:
@@ -220,16 +223,16 @@ def run_repeat(settings: Settings, runner: Runner) -> list[RepeatData]:
 
 @dataclass(frozen=True)
 class ConvergenceData:
-    """Lengths against the number of samples."""
+    """Path lengths by the number of samples."""
 
     scene: str
     samples: tuple[int, ...]
     lengths: list[list[float]]  # for each number of samples, map units
-    true_length: float
+    true_length: float  # map units
 
 
 def run_convergence(settings: Settings, runner: Runner) -> ConvergenceData:
-    """More and more samples, several runs each."""
+    """Plan with rising numbers of samples, several times with each."""
     scale, scene = settings.scale, CONVERGENCE_SCENE
     (truth,) = runner.run("convergence, geodesics", [settings.truth(scene)])
     runs = scale.convergence_runs
@@ -249,9 +252,9 @@ class SensitivityData:
     """How far the ends of a scene's geodesics move with their directions."""
 
     scene: str
-    truth: FanSummary
-    sweep: Sweep
-    found: SweepSummary
+    truth: FanSummary  # of the search for the true length
+    sweep: Sweep  # the rays
+    found: SweepSummary  # the movement of their ends
 
 
 def run_sensitivity(settings: Settings, runner: Runner) -> list[SensitivityData]:
@@ -267,7 +270,7 @@ def run_sensitivity(settings: Settings, runner: Runner) -> list[SensitivityData]
 
 
 def run_smoothing(settings: Settings, runner: Runner) -> list[SmoothedPath]:
-    """Paths on smoothed edges against the exact ones; seconds, and so not stored."""
+    """Paths on smoothed edges and the exact ones. It takes seconds, so nothing is stored."""
     runner.watch("smoothing", 0, 1)
     found = smoothing_convergence()
     runner.watch("smoothing", 1, 1)

@@ -38,13 +38,13 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def save_figure(figure: Any, path: Path) -> None:
-    """Write a picture, whole or not at all."""
+    """Write a picture, completely or not at all."""
     with written_whole(path) as temporary:
         figure.savefig(temporary, dpi=DOTS_PER_INCH)
 
 
 def _solve(scene: str, settings: Settings, *, chord: bool = False) -> Solution:
-    """The first run once more, this time with its tree."""
+    """The first run again, this time with its tree."""
     return settings.planner(chord=chord).solve(scenes.load(scene))
 
 
@@ -76,7 +76,7 @@ def draw_scene(data: SceneData, settings: Settings, directory: Path) -> list[Pat
 
 
 def draw_comparative(data: ComparativeData, settings: Settings, directory: Path) -> list[Path]:
-    """The path without resistance, on both surfaces; and what both paths meet."""
+    """The path without resistance, on both surfaces; and the profiles of both paths."""
     plain, full = _solve("four-peaks", settings), _solve("six-peaks", settings)
     assert plain.path is not None
     assert full.path is not None
@@ -133,7 +133,7 @@ def draw_convergence_figure(
 def draw_sensitivity(
     data: list[SensitivityData], settings: Settings, directory: Path
 ) -> list[Path]:
-    """For each scene its rays coloured by the movement of their ends, and the movement."""
+    """For each scene the rays, coloured by the movement of their ends, and a chart of it."""
     figure = new_figure(14.0, 5.2 * len(data))
     panels = figure.add_gridspec(len(data), 2, width_ratios=(1.0, 1.25))
     for row, item in enumerate(data):

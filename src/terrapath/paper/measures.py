@@ -1,4 +1,4 @@
-"""What the trials measure: a tree's path, a fan of geodesics, the movement of their ends."""
+"""What the trials measure: tree planners' paths, fans of geodesics, and how their ends move."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..planners import GeodesicTraversal, RRTStar
 from ..problem import Problem, Status
 from .trials import Trial
 
-# Between two rays that show how they part, radians.
+# The angle between two rays that show how rays part, radians.
 PAIR_ANGLE = math.radians(0.1)
 
 
@@ -22,7 +22,7 @@ class PlannedPath:
     """What a tree planner found. Lengths in map units."""
 
     length: float  # true length under h
-    cost: float  # what the planner believed
+    cost: float  # the planner's own measure of it
     points: tuple[tuple[float, float], ...]  # map units, from start to goal
 
 
@@ -33,7 +33,7 @@ class PathTrial(Trial[PlannedPath]):
     planner: RRTStar
 
     def measure(self) -> PlannedPath:
-        """Plan. A Ctrl-C that the planner would answer with its best so far is passed on."""
+        """Plan. Ctrl-C, which the planner answers with its best path so far, is passed on."""
         solution = self.planner.solve(self.problem)
         if solution.status is Status.INTERRUPTED:
             raise KeyboardInterrupt
@@ -49,7 +49,7 @@ class ExactGeodesic:
 
     angle: float  # of its first step on the plane, radians
     length: float  # map units
-    jacobi_at_goal: float  # movement of its end, map units a radian
+    jacobi_at_goal: float  # movement of its end, map units per radian
     conjugate_points: tuple[float, ...]  # arc lengths, map units
 
 
@@ -57,7 +57,7 @@ class ExactGeodesic:
 class FanSummary:
     """What a traversal of geodesics found."""
 
-    near: int  # rays within the radius about the goal
+    near: int  # rays that come within the radius of the goal
     paper_length: float | None  # the paper's answer, map units
     geodesics: tuple[ExactGeodesic, ...]  # shortest first
 
@@ -81,7 +81,7 @@ class FanTrial(Trial[FanSummary]):
     planner: GeodesicTraversal
 
     def measure(self) -> FanSummary:
-        """Trace the fan, and hit the goal with every geodesic that can."""
+        """Trace the fan, and find all geodesics that end at the goal."""
         fan = self.planner.fan(self.problem)
         if not fan.geodesics:
             raise InputError(f"{self.planner} hit no goal on {self.scene}; give more directions")
@@ -91,7 +91,7 @@ class FanTrial(Trial[FanSummary]):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """Rays of one length in many directions, over the edge of the region where they lead."""
+    """Rays of one length in many directions; they may leave the region."""
 
     directions: int
     length: float  # map units
@@ -117,15 +117,15 @@ class Sweep:
 
 @dataclass(frozen=True)
 class SweepSummary:
-    """How far the end of a ray moves with its direction, one entry a ray."""
+    """How far the end of a ray moves with its direction; one entry for each ray."""
 
     angles: tuple[float, ...]  # radians
-    movement: tuple[float, ...]  # map units a radian
+    movement: tuple[float, ...]  # map units per radian
 
 
 @dataclass(frozen=True)
 class SweepTrial(Trial[SweepSummary]):
-    """End-point movement against direction, by the Jacobi field."""
+    """End-point movement by direction, from the Jacobi field."""
 
     planner: Sweep
 

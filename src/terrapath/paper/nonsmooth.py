@@ -1,8 +1,8 @@
-"""The paper's open end: surfaces with edges, smoothed over an ever smaller scale.
+"""The paper's open question: surfaces with edges, smoothed over smaller and smaller scales.
 
-Three sharp surfaces unroll into the plane, so that their geodesics are known in closed form:
-a cone, a square pyramid and a step. Each is smoothed, the shortest path on the smoothed
-surface is found, and its length is compared with the sharp surface's.
+Three sharp surfaces can be unrolled into the plane, so their geodesics are known in closed form: a
+cone, a square pyramid and a step. Each is smoothed, the shortest path on the smoothed surface is
+found, and its length is compared with that on the sharp surface.
 """
 
 from __future__ import annotations
@@ -16,37 +16,35 @@ import numpy as np
 from ..geodesics.refinement import shortest_polyline
 from ..surface import Surface, metric
 from ..surface.fitting import Function
-from ..validation import Array
+from ..validation import Array, Point
 
 REGION = (-5.0, -5.0, 5.0, 5.0)
 SCALES = (0.4, 0.2, 0.1, 0.05)  # map units
-PIECES = (32, 64, 128, 256, 512)  # of the path; each number starts from the path of the one before
+PIECES = (32, 64, 128, 256, 512)  # of the path, from coarse to fine
 
-Point = tuple[float, float]
-
-# Polar coordinates about an apex, from the plane to the unrolled sheet or back:
-# angle (m,) -> the factor that the radius grows by, and the new angle.
+# Maps polar coordinates around an apex from the plane to the unrolled sheet, or back:
+# angle (m,) -> factor on the radius (m,), new angle (m,).
 Turn = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
 class SharpSurface:
-    """A height with edges, and the shortest path between two points on it, exactly."""
+    """A height with edges, and the exact shortest path between two points on it."""
 
     name: str
     height: Function
     true_length: float  # map units
-    true_path: Callable[[Array], Array]  # shares (m,) of the way -> points (m, 2), map units
+    true_path: Callable[[Array], Array]  # shares (m,) of the path -> points (m, 2), map units
 
 
 @dataclass(frozen=True)
 class SmoothedPath:
-    """The shortest path on a sharp surface that was smoothed."""
+    """The shortest path on a smoothed surface, compared with that on the sharp one."""
 
     surface: str
     scale: float  # map units
     largest_change: float  # of the height
-    rms_change: float
+    rms_change: float  # root mean square, of the height
     length: float  # of the path found, under the smoothed surface's h, map units
     true_length: float  # of the sharp surface's geodesic
 
@@ -62,10 +60,10 @@ class SmoothedPath:
 def _around_apex(
     name: str, height: Function, unroll: Turn, roll: Turn, start: Point, goal: Point
 ) -> SharpSurface:
-    """A surface that unrolls about an apex into a sheet of less than a full turn.
+    """A surface that unrolls around an apex into a sheet of less than a full turn.
 
-    The straight line on the sheet is the geodesic. It never meets the apex, for the smaller
-    of the two ways round takes less than half a turn on the sheet.
+    The straight line on the sheet is the geodesic. It never meets the apex, because on one side the
+    angle between start and goal is less than half a turn on the sheet.
     """
     a, b = complex(*start), complex(*goal)
     angles = np.angle(a) + np.array([0.0, np.angle(b / a)])
@@ -86,7 +84,7 @@ def cone(
 ) -> SharpSurface:
     """The cone z = top - slope * r.
 
-    On the sheet, radii grow by sqrt(1 + slope^2) and angles shrink by as much.
+    On the sheet, radii are larger by the factor sqrt(1 + slope^2), and angles smaller by the same.
     """
     stretch = math.hypot(1.0, slope)
     return _around_apex(
@@ -100,7 +98,7 @@ def cone(
 
 
 def _face_by_face(face: float, new_face: float, stretch: float) -> Turn:
-    """Turn faces of one apex angle into faces of another, stretched along their middles."""
+    """Map faces with one angle at the apex to faces with another, stretched along their middles."""
 
     def turn(angle: Array) -> tuple[Array, Array]:
         k = np.round(angle / face)
@@ -113,7 +111,7 @@ def _face_by_face(face: float, new_face: float, stretch: float) -> Turn:
 def pyramid(
     start: Point = (-3.0, -1.0), goal: Point = (3.0, 0.0), *, top: float = 3.0, slope: float = 1.0
 ) -> SharpSurface:
-    """The square pyramid z = top - slope * max(|x1|, |x2|), its faces laid side by side."""
+    """The square pyramid z = top - slope * max(|x1|, |x2|), unrolled face by face."""
     stretch = math.hypot(1.0, slope)
     face, unfolded = 0.5 * math.pi, 2.0 * math.atan(1.0 / stretch)
     return _around_apex(
@@ -129,9 +127,9 @@ def pyramid(
 def step(
     start: Point = (-3.0, -2.0), goal: Point = (3.0, 2.0), *, height: float = 2.0
 ) -> SharpSurface:
-    """A vertical cliff along x1 = 0, from 0 up to the height; start lies below it.
+    """A vertical cliff along x1 = 0, from 0 up to the height; the start lies below it.
 
-    The cliff is part of the way: on the sheet it is a strip as wide as it is high.
+    The path climbs the cliff. On the sheet the cliff is a strip as wide as it is high.
     """
     first, last = np.array(start), np.array([goal[0] + height, goal[1]])
 
@@ -170,7 +168,7 @@ def smoothed_path(sharp: SharpSurface, scale: float) -> SmoothedPath:
 def smoothing_convergence(
     surfaces: Iterable[SharpSurface] | None = None, scales: Sequence[float] = SCALES
 ) -> list[SmoothedPath]:
-    """Path lengths on smoothed surfaces against those of the sharp ones, scale by scale.
+    """Path lengths on smoothed surfaces and on the sharp ones, for each scale.
 
     surfaces : by default the cone, the pyramid and the step. scales : map units.
     """

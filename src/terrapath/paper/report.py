@@ -1,4 +1,4 @@
-"""The report: the paper's numbers, ours and the true lengths side by side, in Markdown."""
+"""The report in Markdown: the paper's numbers, ours and the true lengths side by side."""
 
 from __future__ import annotations
 
@@ -279,7 +279,7 @@ def _smoothing_section(data: list[SmoothedPath], settings: Settings) -> list[str
         f"Order of the error in the scale, fitted over all scales: {orders}. A geodesic misses "
         "the apex of a cone, so its error is of second order; it crosses the edges of a pyramid, "
         "first order. A cliff's error goes as s times the root of a logarithm of 1/s, so its order "
-        "reaches 1 only slowly. A smoothed edge always shortens the way.",
+        "reaches 1 only slowly. A smoothed edge always shortens the path.",
         "",
     ]
 
@@ -351,7 +351,7 @@ def _scale_note(settings: Settings) -> list[str]:
 
 
 def processor() -> str:
-    """What the machine calls its processor."""
+    """The processor's name."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -361,7 +361,7 @@ def processor() -> str:
 
 
 def machine_lines() -> list[str]:
-    """The report's section on the machine and the versions of what matters."""
+    """The report's section on the machine and on the versions of libraries."""
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "scipy", "numba", "matplotlib"))
     return [
         "## Machine and versions",

@@ -1,4 +1,4 @@
-"""The paper's section 5 in one directory: trials, pictures, report."""
+"""The reproduction of the paper's section 5 in one directory: trials, pictures, report."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TRIALS = "trials"
 
 
 def chosen_experiments(what: str) -> list[str]:
-    """Names of the experiments that a word stands for."""
+    """The names of the experiments that ``what`` stands for; InputError where it is not known."""
     if what == ALL:
         return list(EXPERIMENTS)
     if what not in EXPERIMENTS:
@@ -35,7 +35,10 @@ def chosen_experiments(what: str) -> list[str]:
 
 
 def claim(directory: Path, record: dict[str, Any]) -> None:
-    """Make the output directory, or find that it belongs to a run with the same settings."""
+    """Make the output directory, or check that it belongs to a run with the same settings.
+
+    Raises InputError where it does not, and MapError where it cannot be written.
+    """
     where = f"output={str(directory)!r}"
     remedy = "name another --output, or delete it"
     try:
@@ -82,10 +85,11 @@ def reproduce(
 ) -> Path:
     """Run experiments of the paper, draw them and report them.
 
-    what : "all" or one of ``EXPERIMENTS``. output : directory; a run that was stopped there
-    goes on. quick : fewer samples and runs. seed : of the first trial. workers : processes;
-    by default one a core. Returns the report's path.
-    Raises InputError where the directory belongs to a run with other settings.
+    what : "all" or one of ``EXPERIMENTS``. output : directory; a run that was stopped there is
+    continued. quick : fewer samples and runs. seed : of the first trial. workers : processes; by
+    default one for each core. watch : is shown the progress. Returns the report's path.
+    Raises InputError where the directory belongs to a run with other settings, MapError where it
+    cannot be written.
     """
     names = chosen_experiments(what)
     require_seed(seed)

@@ -17,7 +17,7 @@ from typing import Any
 from .._support.watching import Watch, watch_nothing
 from .trials import Result, Store, Trial
 
-# Held while a result is written, so that a worker that is told to end leaves no half file.
+# Held while a result is written, so that a worker that must end leaves no half file.
 _SAVING = threading.Lock()
 
 
@@ -36,18 +36,18 @@ def _end_when_closed(lifeline: Connection) -> None:
 
 
 def _prepare_worker(lifeline: Connection) -> None:
-    """Ctrl-C is the parent's to answer; a parent that gives up, or is killed, ends the worker."""
+    """Leave Ctrl-C to the parent; the worker ends when the parent gives up or is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_when_closed, args=(lifeline,), daemon=True).start()
 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits: a process that is started meanwhile is born deaf to it (POSIX)."""
+    """Hold back Ctrl-C; on POSIX, processes that are started meanwhile ignore it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # Started now, because its start would let Ctrl-C through again.
+    # It is started first, because its start would let Ctrl-C through again.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -57,10 +57,10 @@ def _interrupts_held() -> Iterator[None]:
 
 
 class Runner:
-    """Runs trials, or finds their results in the store.
+    """Runs trials, or loads their results from the store. It is a context manager.
 
-    workers : processes; with 1 the trials run in this one. Use it as a context manager.
-    A trial that fails, or Ctrl-C, ends the run; what was finished stays stored.
+    workers : number of processes; with 1 the trials run in this one. watch : is shown the progress.
+    A trial that fails ends the run, and so does Ctrl-C; finished trials stay stored.
     """
 
     def __init__(self, store: Store, workers: int, watch: Watch = watch_nothing) -> None:

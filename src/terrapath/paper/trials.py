@@ -1,4 +1,4 @@
-"""Trials: runs that their settings determine, and the files that keep their results."""
+"""Trials: runs whose settings determine the result, and the files that store results."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ Result = TypeVar("Result")
 
 
 def canonical(record: Any) -> str:
-    """JSON with one spelling for one content."""
+    """JSON that is the same text for the same content."""
     return json.dumps(record, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def digest(record: Any) -> str:
-    """Hash of a record's content, 64 hexadecimal digits; the same in every process."""
+    """A hash of a record's content, 64 hexadecimal digits; it is the same in every process."""
     return hashlib.sha256(canonical(record).encode()).hexdigest()
 
 
 def rebuilt(kind: Any, record: Any) -> Any:
-    """What ``dataclasses.asdict`` made a record of, from its JSON.
+    """The object that ``dataclasses.asdict`` made a record of, from the record's JSON.
 
-    kind : a dataclass whose fields are numbers, texts, dataclasses, tuples of one kind, or
-    one of these or None.
+    kind : a dataclass. Its fields are numbers, texts, dataclasses, tuples of one of these, or one
+    of these or None.
     """
     if record is None:
         return None
@@ -50,7 +50,7 @@ def rebuilt(kind: Any, record: Any) -> Any:
 
 @cache
 def _scene_settings(name: str) -> dict[str, Any]:
-    """All numbers that make a scene, so that a changed scene has other trials."""
+    """All numbers that define a scene, so that a changed scene has other trials."""
     problem = scenes.load(name)
     data = {field: array.tolist() for field, array in problem.surface.data._asdict().items()}
     return {
@@ -64,9 +64,10 @@ def _scene_settings(name: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Trial(ABC, Generic[Result]):
-    """One planner on one scene: everything that its result depends on.
+    """One planner on one scene: all that the result depends on.
 
-    Its result is a dataclass, the one that a subclass names in ``Trial[...]``.
+    scene : its name. planner : a dataclass with a name. The result is a dataclass; a subclass names
+    it in ``Trial[...]``.
     """
 
     scene: str
@@ -98,10 +99,10 @@ class Trial(ABC, Generic[Result]):
 
     @abstractmethod
     def measure(self) -> Result:
-        """Run it."""
+        """Run the trial."""
 
     def decode(self, record: dict[str, Any]) -> Result:
-        """The result from the fields that were stored."""
+        """The result from its stored fields."""
         found: Result = rebuilt(self._kind, record)
         return found
 
@@ -113,11 +114,11 @@ class Store:
         self.directory = directory
 
     def path(self, trial: Trial[Any]) -> Path:
-        """Where a trial's result is kept."""
+        """The file of a trial's result."""
         return self.directory / f"{trial.key}.json"
 
     def load(self, trial: Trial[Result]) -> Result | None:
-        """A trial's result; None where there is none, or where its file is damaged."""
+        """A trial's stored result; None where there is none, or its file is damaged."""
         try:
             record = json.loads(self.path(trial).read_text(encoding="utf-8"))
             sealed = record.pop("digest")
@@ -128,7 +129,7 @@ class Store:
             return None
 
     def save(self, trial: Trial[Result], result: Result) -> None:
-        """Keep a trial's result, whole or not at all."""
+        """Store a trial's result, completely or not at all."""
         record = {"settings": trial.settings, "result": dataclasses.asdict(result)}  # type: ignore[call-overload]
         sealed = canonical({**record, "digest": digest(record)})
         with written_whole(self.path(trial)) as temporary:
@@ -136,5 +137,5 @@ class Store:
 
 
 def _plain(record: Any) -> Any:
-    """A record as it comes back from its file."""
+    """A record as it is read back from its file."""
     return json.loads(canonical(record))

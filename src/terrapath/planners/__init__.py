@@ -1,4 +1,4 @@
-"""Planners. One planner, one file; ``PLANNERS`` is the registry."""
+"""Planners: one planner, one file; ``PLANNERS`` is their registry."""
 
 import lazy_loader
 

@@ -1,35 +1,40 @@
-"""What every planner offers."""
+"""What every planner offers, and what planners share."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from ..problem import Problem, Solution, Status
 from ..space.lattice import Lattice
+from ..validation import require_positive
 
-# What a planner says that did not have to search.
+# Why a search was not needed: it is proven that there is no path.
 SEPARATED = "start and goal lie in different parts of the free space"
 
-
-# What a solution says that Ctrl-C ended.
+# What stopped a search that Ctrl-C ended.
 INTERRUPT = "interrupt"
 
-# Where no path is found the lattice may be too coarse for a gap: so often it is made finer.
+# Where no path is found, the lattice may be too coarse to see a gap. Its spacing is halved this
+# many times.
 HALVINGS = 2
 
-# What a planner is at.
+# The stages of a run.
 SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bound"
 
 
 class Progress(NamedTuple):
-    """Where a running planner stands."""
+    """How far a running planner is.
 
-    samples: int
-    total: int
-    seconds: float
+    stage : SEARCHING, REFINING or PROVING. leg : which leg of a tour is planned.
+    """
+
+    samples: int  # taken so far: samples, nodes or rays
+    total: int  # of them, at most
+    seconds: float  # since the run began
     best_cost: float  # map units, infinite before the first path
     lower_bound: float = 0.0  # map units, 0 before one is proven
     stage: str = SEARCHING
@@ -49,7 +54,10 @@ Callback = Callable[[Progress], bool | None]
 
 
 class Stopper:
-    """The clock and the callback of a run, and which of them ended it."""
+    """The clock and the callback of a run, and which of them ended it.
+
+    time_limit : seconds. ``stopped_by`` is empty until one of them ends the run.
+    """
 
     def __init__(self, callback: Callback | None, time_limit: float | None) -> None:
         self.callback, self.time_limit = callback, time_limit
@@ -62,7 +70,7 @@ class Stopper:
         return time.perf_counter() - self.started
 
     def must_stop(self, progress: Progress) -> bool:
-        """Show the progress to the callback and look at the clock; once True, always True."""
+        """Show the progress to the callback and check the clock; once True, always True."""
         if self.callback is not None and self.callback(progress):
             self.stopped_by = "callback"
         elif self.time_limit is not None and progress.seconds >= self.time_limit:
@@ -71,18 +79,62 @@ class Stopper:
 
 
 class Planner(Protocol):
-    """A frozen set of options that turns problems into solutions."""
+    """A frozen dataclass of options that turns problems into solutions.
+
+    A planner that can be limited has an option ``time_limit``, seconds.
+    """
 
     @property
     def name(self) -> str:
         """The planner's name on the command line."""
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
+        """Plan. ``callback`` sees the progress and stops the planner by returning True.
+
+        time_limit : seconds for this call; a lower limit among the planner's options counts.
+        """
+
+
+def options_of(planner: object) -> dict[str, Any]:
+    """The options of a planner by name: its fields; none where it is no dataclass."""
+    if not dataclasses.is_dataclass(planner):
+        return {}
+    return {field.name: getattr(planner, field.name) for field in dataclasses.fields(planner)}
+
+
+def limit_of(planner: Planner) -> float | None:
+    """The time limit among a planner's options, seconds; None where it has none."""
+    limit: float | None = getattr(planner, "time_limit", None)
+    return limit
+
+
+def least_limit(own: float | None, asked: float | None) -> float | None:
+    """The time limit of one call, seconds: the lower of the planner's own and the caller's."""
+    if asked is not None:
+        require_positive(time_limit=asked)
+    return min((limit for limit in (own, asked) if limit is not None), default=None)
+
+
+def solve_within(
+    planner: Planner, problem: Problem, callback: Callback | None, time_limit: float | None
+) -> Solution:
+    """What a planner answers within a time limit, seconds.
+
+    Without a limit the argument is left out, so that planners that do not take it work, too.
+    """
+    if time_limit is None:
+        return planner.solve(problem, callback=callback)
+    return planner.solve(problem, callback=callback, time_limit=time_limit)
 
 
 def stay_put(problem: Problem, planner: str, seed: int | None = None) -> Solution:
-    """The answer where the start is the goal: a path of length 0."""
+    """The solution where the start is the goal: a path of length 0."""
     return Solution(
         problem=problem,
         planner=planner,
@@ -104,7 +156,7 @@ def without_path(
     seconds: float = 0.0,
     seed: int | None = None,
 ) -> Solution:
-    """The answer where nothing was searched, and there is no path."""
+    """The solution where nothing was searched, and there is no path."""
     return Solution(
         problem=problem,
         planner=planner,
@@ -120,10 +172,10 @@ def without_path(
 def answer_without_search(
     problem: Problem, planner: str, seed: int | None = None
 ) -> Solution | None:
-    """The answer where the start is the goal, or where it is proven that no path exists.
+    """The solution where the start is the goal, or where it is proven that no path exists.
 
-    None where a search is needed. Every planner asks this first; one that then ends without
-    a path has not found one, and no more is known.
+    None where a search is needed. Every planner calls this first. So a planner that searches
+    and finds no path only says that it found none; it proves nothing.
     """
     if problem.start == problem.goal:
         return stay_put(problem, planner, seed)
@@ -135,9 +187,9 @@ def answer_without_search(
 
 
 def lattices(problem: Problem, spacing: float | None) -> Iterator[Lattice]:
-    """The lattice to look for a path on, and finer ones for where it shows none.
+    """A lattice to search for a path, then finer ones, for where it shows none.
 
-    spacing : of the first one's nodes, map units; by default the problem's own.
+    spacing : of the nodes of the first, map units; by default the problem's.
     """
     first = spacing or problem.default_spacing
     for halvings in range(HALVINGS + 1):

@@ -1,7 +1,8 @@
 """Maps too large to plan on as a whole: first coarse, then fine around the coarse route.
 
-The bound of the fine answer holds for paths in the corridor alone, and is said to; for the
-whole map the chord is a bound, where no cost layer can make ground cheap elsewhere.
+The lower bound of the fine solution holds only for paths in the corridor around that route, and
+the solution says so. For the whole map the chord is a lower bound, unless there are cost layers:
+these could make ground elsewhere cheap.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import shapely
 
@@ -17,33 +18,34 @@ from .._kernels.surface.surfaces import Spline
 from ..errors import BlockedError, InputError, OutsideSurfaceError
 from ..problem import Problem, Solution, Status
 from ..surface import Surface, metric
-from ..validation import Array, require_positive
+from ..validation import Array, PointLike, require_positive
 from . import FastMarching, Finished, plan_tour
 from .base import Callback, Planner, Progress
 
 # The map is read about so coarse at first.
 COARSE_CELLS = 1_000_000
-# Of the corridor's window no more cells are read; a larger one is read coarser.
+# No more cells than this are read of the corridor's surroundings; a larger window is read coarser.
 MOST_FINE_CELLS = 120_000_000
 # Half the corridor's width, in coarse cells.
 HALF_WIDTH = 40.0
-# What is read around the corridor, in coarse cells, so that the surface does not end with it.
+# The margin that is read around the corridor, in coarse cells, so that the surface reaches beyond.
 MARGIN = 2.0
 
 
 class Part(NamedTuple):
-    """What is read of a map, and where on it a path may go."""
+    """The part of a map that is read, and where on it a path may go."""
 
     within: tuple[float, float, float, float] | None = None  # the map's own coordinates
-    decimate: int = 1  # cells a side that one is read of
-    corridor: Corridor | None = None
+    decimate: int = 1  # this many cells, on each side, are read as one
+    corridor: Corridor | None = None  # the path must stay in it
 
 
 @dataclass(frozen=True, eq=False)
 class Corridor:
-    """The ground within ``half_width`` of a route planned on a coarser map, map units.
+    """The ground near a route that was planned on a coarser map.
 
-    decimate : how many cells of the map, a side, one was planned on.
+    coarse : the solution on the coarser map. half_width : map units, on either side of its path.
+    decimate : this many cells of the map, on each side, are one of the coarser map.
     """
 
     coarse: Solution
@@ -54,8 +56,14 @@ class Corridor:
         require_positive(corridor=self.half_width)
 
     @property
+    def coarse_length(self) -> float:
+        """Length of the coarse route, map units."""
+        assert self.coarse.path is not None
+        return self.coarse.path.length
+
+    @property
     def area(self) -> shapely.Polygon:
-        """On the plane that the coarse route was planned in."""
+        """The corridor on the plane that the coarse route was planned in."""
         assert self.coarse.path is not None
         return self.coarse.path.line.buffer(self.half_width)
 
@@ -67,8 +75,8 @@ class Corridor:
         (west, south), (east, north) = points.min(axis=0), points.max(axis=0)
         return float(west), float(south), float(east), float(north)
 
-    def area_on(self, surface: Surface) -> Any:
-        """On the plane of another surface of the same map."""
+    def area_on(self, surface: Surface) -> shapely.Polygon:
+        """The corridor on the plane of another surface of the same map."""
         theirs, ours = surface.georeference, self.coarse.problem.surface.georeference
         if theirs is None or ours is None or theirs.crs == ours.crs:
             return self.area
@@ -76,21 +84,22 @@ class Corridor:
         def moved(points: Array) -> Array:
             return theirs.from_map(ours.to_map(points))
 
-        # A local projection depends on the part of the map: between two nothing bends much.
+        # Each part of a map has a local projection of its own; they differ little.
         return shapely.transform(self.area.segmentize(0.25 * self.half_width), moved)
 
     @staticmethod
     def least_length(solution: Solution) -> float | None:
-        """No path on the whole map is shorter: the chords from stop to stop, map units.
+        """A lower bound for the whole map: the chords from stop to stop, map units.
 
-        None with cost layers: their least on the map is not known, for only a part was read.
+        None where there are cost layers: only a part of the map was read, so the least cost on
+        the map is not known.
         """
         surface = solution.problem.surface
         return None if surface.costs else metric.chord_through(surface, solution.stops)
 
 
-# The problem on a part of the map, and the points that are to be passed.
-Pose = Callable[[Part], tuple[Problem, Sequence[Any]]]
+# Makes the problem on a part of the map, and the points to pass on the path.
+Pose = Callable[[Part], tuple[Problem, Sequence[PointLike]]]
 
 
 def plan_in_corridor(
@@ -103,10 +112,10 @@ def plan_in_corridor(
 ) -> Solution:
     """Plan on a coarser map, and on the map itself around the route found there.
 
-    cells : of the map, which tell how coarse. half_width : of the corridor, map units; by
-    default 40 coarse cells. The answer has its ``corridor``; its bound holds for paths in
-    there. Without a way on the coarse map the answer is that none was found.
-    Raises what ``pose`` does, with a remedy where only the coarse map is in the way.
+    cells : how many the map has. half_width : of the corridor, map units; by default 40 coarse
+    cells. The solution has its ``corridor``, and its lower bound holds for paths in there. Where
+    there is no path on the coarse map, the solution is that none was found.
+    Raises what ``pose`` does. Where only the coarse map is the reason, the error says so.
     """
     decimate = factor(cells, COARSE_CELLS)
     rough = _coarse(pose, decimate, callback)
@@ -117,9 +126,9 @@ def plan_in_corridor(
     window = corridor.within(MARGIN * cell)
     seen = min(_share(window, rough.problem.surface), 1.0) * cells
     problem, via = pose(Part(window, factor(seen, MOST_FINE_CELLS), corridor))
-    solution = plan_tour(problem, planner, via, callback=_told(callback, "corridor"))
+    solution = plan_tour(problem, planner, via, callback=_named(callback, "corridor"))
     if solution.path is None and solution.status is not Status.INTERRUPTED:
-        # Whatever was proven is proven of the corridor, not of the map.
+        # A proof holds for the corridor, not for the map.
         hint = "fast-marching looks everywhere in the corridor, and --corridor WIDTH widens it"
         reason = f"{solution.stopped_by}; {hint}"
         solution = replace(solution, status=Status.NOT_FOUND, stopped_by=reason)
@@ -127,7 +136,7 @@ def plan_in_corridor(
 
 
 def factor(cells: float, most: int) -> int:
-    """How many cells a side become one, so that no more than about ``most`` are left."""
+    """How many cells, on each side, to read as one, so that about ``most`` are left at most."""
     return max(math.ceil(math.sqrt(cells / most)), 1)
 
 
@@ -140,25 +149,25 @@ def _coarse(pose: Pose, decimate: int, callback: Callback | None) -> Solution:
             "with --corridor none"
         ) from None
     planner = Finished(planner=FastMarching(spacing=_cell(problem)), refine=True)
-    return plan_tour(problem, planner, via, callback=_told(callback, "coarse map"))
+    return plan_tour(problem, planner, via, callback=_named(callback, "coarse map"))
 
 
 def _without_corridor(rough: Solution, decimate: int) -> Solution:
-    reason = f"no way on the map read {decimate} times coarser"
+    reason = f"no path on the map read {decimate} times coarser"
     if rough.status is Status.INTERRUPTED:
         return rough
     return replace(rough, status=Status.NOT_FOUND, stopped_by=reason)
 
 
 def _cell(problem: Problem) -> float:
-    """Of the coarse map, map units."""
+    """The larger side of a cell of the coarse map, map units."""
     data = problem.surface.data
-    assert isinstance(data, Spline)  # as all maps are
+    assert isinstance(data, Spline)  # every map is
     return float(max(data.dx, data.dy))
 
 
 def _share(window: tuple[float, float, float, float], surface: Surface) -> float:
-    """Of the map's area, the share that lies in a window of its own coordinates."""
+    """The share of a surface's area that lies in a window of the map's own coordinates."""
     assert surface.bounds is not None
     box, reference = shapely.box(*surface.bounds), surface.georeference
     if reference is not None:
@@ -166,8 +175,8 @@ def _share(window: tuple[float, float, float, float], surface: Surface) -> float
     return float(shapely.box(*window).intersection(box).area / box.area)
 
 
-def _told(callback: Callback | None, where: str) -> Callback | None:
-    """The callback, told on which map it is."""
+def _named(callback: Callback | None, where: str) -> Callback | None:
+    """The callback, with the map named in each progress that it sees."""
     if callback is None:
         return None
 

@@ -1,4 +1,4 @@
-"""Fast marching: the shortest path down the distance field."""
+"""Fast marching: the shortest path, by descent of the distance field."""
 
 from __future__ import annotations
 
@@ -9,18 +9,26 @@ from ..distance.field import DistanceField, Medium, march_from
 from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..validation import require_positive
-from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
+from .base import (
+    INTERRUPT,
+    Callback,
+    Progress,
+    Stopper,
+    answer_without_search,
+    lattices,
+    least_limit,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class FastMarching:
-    """The eikonal equation of h on a lattice, and the steepest way down its solution.
+    """The eikonal equation of h on a lattice, and steepest descent on its solution.
 
-    spacing : of the nodes, map units; by default a 250th of the region's longer side, or a cell
-    of a finer map. Where no path is found, half and a quarter of it are tried.
-    time_limit : seconds, looked at while the field is solved.
+    spacing : of the lattice's nodes, map units; by default a 250th of the region's longer side,
+    or a cell of the map where that is less. Where no path is found, half and a quarter of it are
+    tried. time_limit : seconds, checked while the field is solved.
 
-    ``cost`` is the distance that the field gives at the goal, ``samples`` the nodes settled.
+    ``cost`` is the value of the field at the goal, ``samples`` the number of nodes settled.
     Source: Mirebeau 2014 (stencils); Sethian 1996 (fast marching).
     """
 
@@ -36,19 +44,29 @@ class FastMarching:
         """The planner's name on the command line."""
         return "fast-marching"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
+        """Plan. ``callback`` sees the progress and stops the planner by returning True.
+
+        time_limit : seconds for this call; the lower of it and the option counts.
+        """
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
-        return _Run(self, problem, callback).solve()
+        stopper = Stopper(callback, least_limit(self.time_limit, time_limit))
+        return _Run(self, problem, stopper).solve()
 
 
 class _Run:
-    """One run, and how far it came."""
+    """One run, and how far it has come."""
 
-    def __init__(self, planner: FastMarching, problem: Problem, callback: Callback | None) -> None:
+    def __init__(self, planner: FastMarching, problem: Problem, stopper: Stopper) -> None:
         self.planner, self.problem = planner, problem
-        self.stopper = Stopper(callback, planner.time_limit)
+        self.stopper = stopper
         self.settled, self.total = 0, 0
 
     def solve(self) -> Solution:
@@ -64,10 +82,10 @@ class _Run:
                     break
         except KeyboardInterrupt:
             self.stopper.stopped_by = INTERRUPT
-        return self.answer(None, None, self.stopper.stopped_by or "no way between the nodes")
+        return self.answer(None, None, self.stopper.stopped_by or "no path between the nodes")
 
     def march(self, lattice: Lattice) -> DistanceField:
-        """The field, as far as there is time for it."""
+        """The distance field, solved as far as the time limit allows."""
         problem = self.problem
         self.total = lattice.nx * lattice.ny
         medium = Medium.of_surface(problem.surface, lattice, problem.free_space)

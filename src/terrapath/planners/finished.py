@@ -1,4 +1,4 @@
-"""What is done with any planner's answer: refine the path, and prove how good it is."""
+"""What is done with any planner's solution: refine the path, and prove how good it is."""
 
 from __future__ import annotations
 
@@ -13,20 +13,30 @@ from ..certificates.search import lower_bound
 from ..geodesics.refinement import refine
 from ..problem import Problem, Solution, Status
 from ..validation import require_bool, require_positive
-from .base import INTERRUPT, PROVING, REFINING, Callback, Planner, Progress
+from .base import (
+    INTERRUPT,
+    PROVING,
+    REFINING,
+    Callback,
+    Planner,
+    Progress,
+    least_limit,
+    options_of,
+    solve_within,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
-    """A planner whose answers are refined and bounded.
+    """A planner whose paths are refined, and whose solutions get a lower bound.
 
-    refine : take the path to the locally shortest one. bound : prove a lower bound on every
-    path's length, to a gap of one coarse lattice. target_gap : refine the bound until
-    (length - bound) / bound is met, which asks for a bound. time_limit : seconds for all
-    together, looked at between the lattices of a bound.
+    refine : take the path to the locally shortest one. bound : prove a lower bound on the
+    length of every path, on one coarse lattice. target_gap : improve the bound until
+    (length - bound) / bound is no more than this; it implies ``bound``. time_limit : seconds
+    for the planner and the finishing together, checked between the lattices of a bound.
 
-    What the planner itself has refined or proven is not done again. An answer that was
-    interrupted is left as it is, and no failure here loses the planner's path.
+    What the planner itself has refined or proven is not done again. An interrupted solution
+    is left as it is. If the finishing fails, the planner's path is kept.
     """
 
     planner: Planner
@@ -45,29 +55,34 @@ class Finished:
         return self.planner.name
 
     def _options(self) -> dict[str, Any]:
-        """What was asked for, as far as it says anything; the planner's own word is the last."""
-        own = {name: value for name, value in vars(self.planner).items() if name[0] != "_"}
+        """What was asked for; of two options of one name the planner's counts. None is left out."""
         asked = {"refine": self.refine, "bound": self.bound, "target_gap": self.target_gap}
-        return {
-            name: value
-            for options in (asked, own)
-            for name, value in options.items()
-            if value is not None
-        }
+        options = asked | {k: v for k, v in options_of(self.planner).items() if v is not None}
+        return {name: value for name, value in options.items() if value is not None}
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+        search_limit: float | None = None,
+    ) -> Solution:
         """Plan and finish. ``callback`` sees the progress and may stop the planner or the bound.
 
-        A planner that was stopped by it is finished all the same.
+        time_limit : seconds for this call; the lower of it and the option counts.
+        search_limit : seconds for the planner alone, whatever the finishing takes.
+        Where the callback stops the planner, its path is finished all the same.
         """
-        solution = self.planner.solve(problem, callback=callback)
-        solution = replace(solution, options=self._options())
+        limit = least_limit(self.time_limit, time_limit)
+        searching = least_limit(limit, search_limit)
+        solution = solve_within(self.planner, problem, callback, searching)
         return finish(
-            solution,
+            replace(solution, options=self._options()),
             refine=self.refine,
             bound=self.bound,
             target_gap=self.target_gap,
-            time_limit=self.time_limit,
+            time_limit=limit,
             callback=callback,
         )
 
@@ -81,19 +96,19 @@ def finish(
     time_limit: float | None = None,
     callback: Callback | None = None,
 ) -> Solution:
-    """A solution refined and bounded as asked; see ``Finished``."""
+    """A solution, refined and with a lower bound as asked; see ``Finished``."""
     if refine and solution.status is not Status.INTERRUPTED:
         solution = refined(solution, callback=callback)
     if (bound or target_gap is not None) and solution.status is not Status.INTERRUPTED:
         rest = None if time_limit is None else max(time_limit - solution.seconds, 1e-9)
-        solution = bounded(solution, target_gap=target_gap, time_limit=rest, callback=callback)
+        solution = with_bound(solution, target_gap=target_gap, time_limit=rest, callback=callback)
     return solution
 
 
 def refined(solution: Solution, *, callback: Callback | None = None) -> Solution:
     """The same solution with its path taken to the locally shortest one.
 
-    ``cost`` stays what the planner believed; ``unrefined`` is the planner's own path.
+    ``cost`` stays what the planner returned; ``unrefined`` is the planner's own path.
     """
     problem, given = solution.problem, solution.path
     if given is None or solution.unrefined is not None or problem.start == problem.goal:
@@ -111,7 +126,7 @@ def refined(solution: Solution, *, callback: Callback | None = None) -> Solution
     return replace(solution, path=path, unrefined=given, seconds=seconds)
 
 
-def bounded(
+def with_bound(
     solution: Solution,
     *,
     target_gap: float | None = None,
@@ -120,9 +135,9 @@ def bounded(
 ) -> Solution:
     """The same solution with a proven lower bound on every path's length.
 
-    target_gap : refine the bound until the gap is met. time_limit : seconds. ``callback``
-    sees each bound, and ends its refinement by returning True. Ctrl-C leaves the best that
-    was proven, if any.
+    target_gap : improve the bound until the gap is no more than this. time_limit : seconds.
+    ``callback`` sees each bound, and ends the search for a better one by returning True.
+    After Ctrl-C the best bound proven so far is kept, if there is one.
     """
     _require_limits(target_gap, time_limit)
     if solution.path is None or _is_proven(solution, target_gap):
@@ -155,9 +170,9 @@ def bounded(
 
 
 def with_certificate(solution: Solution, certificate: Certificate) -> Solution:
-    """The solution with its bound; rounding apart, no bound is above a path's length."""
+    """The solution with its bound, which is no more than the path's length."""
     assert solution.length is not None
-    value = min(certificate.value, solution.length)
+    value = min(certificate.value, solution.length)  # above it only by rounding
     return replace(solution, lower_bound=value, certificate=certificate)
 
 
@@ -183,6 +198,6 @@ def _progress(solution: Solution, stage: str, seconds: float) -> Progress:
 
 
 def _announce(solution: Solution, stage: str, callback: Callback | None) -> None:
-    """Tell what begins now; the search is over, so there is nothing to stop yet."""
+    """Show the callback which stage begins; here it can stop nothing."""
     if callback is not None:
         callback(_progress(solution, stage, solution.seconds))

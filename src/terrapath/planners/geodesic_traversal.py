@@ -1,4 +1,4 @@
-"""The paper's ground truth: a fan of geodesics, and the ones that really hit the goal."""
+"""The paper's ground truth: a fan of geodesics, and those that end exactly at the goal."""
 
 from __future__ import annotations
 
@@ -23,25 +23,27 @@ from ..geodesics.rays import (
 )
 from ..problem import Path, Problem, Solution, Status
 from ..validation import Array, as_point, require_count, require_positive
-from .base import Callback, Progress, answer_without_search
+from .base import Callback, Progress, Stopper, answer_without_search, least_limit
 
-# 0.5 in the paper's region of 12 x 12: rays that pass this share of its side from the goal.
+# Rays that pass the goal within this share of the region's side are near it: 0.5 in the paper's
+# region of 12 x 12.
 NEAR_SHARE = 1.0 / 24.0
 
-# No geodesic longer than the straight way is the shortest; a little more finds those over it.
+# Rays are as long as this many times the straight line on the surface. The shortest geodesic is no
+# longer than that line; the rest is a margin.
 LONGEST_SHARE = 1.05
 
-# Steps of a ray at least so many to the region's side, so that no approach is overlooked.
+# A ray's steps are at most the region's side over this, so that no close approach is missed.
 STEPS_PER_SIDE = 40.0
 
 
 @dataclass(frozen=True, eq=False)
 class Fan:
-    """All rays of a traversal and what they found.
+    """All rays of a traversal, and what they found.
 
-    angles : (n,), radians. closest : (n,), planar distance of each ray's closest approach to
-    the goal, map units. near : (n,), which of them come within the radius. geodesics : those
-    found that end exactly at the goal, shortest first.
+    misses : where each ray comes closest to the goal. radius : rays that come within it are near
+    the goal, map units. geodesics : those found that end exactly at the goal, shortest first.
+    interrupted : by Ctrl-C, before all rays were traced.
     """
 
     rays: tuple[Ray, ...]
@@ -75,21 +77,22 @@ class Fan:
 
     @property
     def paper_length(self) -> float | None:
-        """Its length up to where it is closest to the goal, map units."""
+        """The length of that ray, up to where it is closest to the goal, map units."""
         return None if self.paper_ray is None else self.misses[self.paper_ray].arc_length
 
 
 @dataclass(frozen=True, kw_only=True)
 class GeodesicTraversal:
-    """Rays in many directions, the paper's way to the shortest path; then exactly.
+    """Rays in many directions, as the paper does, and from them the exact geodesics to the goal.
 
     directions : how many rays. sector : (first, last) angle, radians; by default 45 degrees to
-    either side of the goal, [0, pi/2] in the paper. radius : which rays count as near the
-    goal, map units; by default a 24th of the region's side, 0.5 in the paper. tolerance : of
-    the integrator's error in each step.
+    either side of the goal, [0, pi/2] in the paper. radius : rays that come within it are near
+    the goal, map units; by default a 24th of the region's side, 0.5 in the paper. tolerance :
+    the largest error of the integrator in each step.
 
-    Where two neighbouring rays pass the goal on different sides, the direction that hits it
-    is solved for. Obstacles are not avoided: geodesics that touch one are left out.
+    Where two neighbouring rays pass the goal on different sides, the geodesic between them that
+    ends at the goal is solved for. Obstacles are not avoided: a geodesic that touches one is
+    left out.
     Source: paper, section 5; appendix 6.1.
     """
 
@@ -138,12 +141,19 @@ class GeodesicTraversal:
             tolerance=self.tolerance,
         )
 
-    def fan(self, problem: Problem, *, callback: Callback | None = None) -> Fan:
+    def fan(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Fan:
         """Trace all rays, and find the geodesic between two of them as soon as both are there.
 
-        A callback that returns True, or Ctrl-C, leaves the fan with what it has.
+        A callback that returns True, the time limit (seconds) and Ctrl-C leave the fan with
+        what it has.
         """
-        started = time.perf_counter()
+        stopper = Stopper(callback, least_limit(None, time_limit))
         misses: list[Miss] = []
         found: list[Geodesic] = []
         interrupted = False
@@ -151,10 +161,9 @@ class GeodesicTraversal:
             for angle in self._angles(problem):
                 misses.append(closest_approach(self._trace(problem, float(angle)), problem.goal))
                 found += self._hits(problem, misses[-2:])
-                seconds = time.perf_counter() - started
                 best = min((geodesic.length for geodesic in found), default=math.inf)
-                report = Progress(len(misses), self.directions, seconds, best)
-                if callback is not None and callback(report):
+                seconds = stopper.seconds
+                if stopper.must_stop(Progress(len(misses), self.directions, seconds, best)):
                     break
         except KeyboardInterrupt:
             interrupted = True
@@ -175,13 +184,23 @@ class GeodesicTraversal:
         )
         return [geodesic] if geodesic is not None and _is_free(problem, geodesic) else []
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """The shortest geodesic of the fan, its path sampled; ``cost`` is its exact length."""
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
+        """The shortest geodesic of the fan, its path sampled; ``cost`` is its exact length.
+
+        ``callback`` sees the progress and stops the planner by returning True. time_limit :
+        seconds for this call.
+        """
         answer = answer_without_search(problem, self.name)
         if answer is not None:
             return answer
         started = time.perf_counter()
-        fan = self.fan(problem, callback=callback)
+        fan = self.fan(problem, callback=callback, time_limit=time_limit)
         paths = tuple(_path(problem, geodesic) for geodesic in fan.geodesics)
         status = Status.SOLVED if paths else Status.NOT_FOUND
         return Solution(
@@ -210,7 +229,7 @@ def _path(problem: Problem, geodesic: Geodesic) -> Path:
 
 
 def _distinct(geodesics: list[Geodesic]) -> tuple[Geodesic, ...]:
-    """Shortest first, those that two brackets found kept once."""
+    """Shortest first, without those that were found twice."""
     kept: list[Geodesic] = []
     for geodesic in sorted(geodesics, key=lambda g: g.length):
         if all(abs(geodesic.angle - other.angle) > 1e-9 for other in kept):
@@ -219,7 +238,7 @@ def _distinct(geodesics: list[Geodesic]) -> tuple[Geodesic, ...]:
 
 
 def _explain(fan: Fan) -> str:
-    """What the fan found, or how near it came."""
+    """What the fan found, or how near its rays came, in words."""
     if fan.geodesics:
         return f"{len(fan.rays)} rays, {len(fan.geodesics)} geodesics"
     if not fan.rays:

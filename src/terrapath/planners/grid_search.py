@@ -15,16 +15,16 @@ from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, answer_without_search
+from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit
 from .tree_search import FEATURES_PER_PANEL
 
 # Vertices settled between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 4096
 
-# How many columns or rows away the farthest of so many neighbours is.
+# For each number of neighbours: how many columns or rows away the farthest one is.
 REACH = {8: 1, 16: 2, 32: 3}
 
-# Vertices are on a straight line where its direction changes by no more than this, radians:
+# Vertices are on a straight line where it turns by no more than this, radians. That allows for
 # rounding in the coordinates of a map.
 STRAIGHT = 1e-7
 
@@ -38,14 +38,14 @@ NO_NODES = np.array([0, -1, 0, -1])
 class Dijkstra:
     """The shortest path through the nodes of a grid, by Dijkstra's algorithm (1959).
 
-    spacing : of the nodes, map units; by default a 250th of the region's
-    longer side, or a cell of a finer map.
+    spacing : of the nodes, map units; by default a 250th of the region's longer side, or a
+    cell of the map where that is less.
     neighbours : of a node: 8; 16, with the knight's moves; or 32, with those to (1, 3) and
         (2, 3) too. However fine the grid, paths on level ground are up to 8.2 %, 2.7 % and
         1.3 % longer than the straight line, because they can take so few directions.
     time_limit : seconds.
 
-    Edges are measured as by RRT*-R: Line-R in panels, never below the chord.
+    Edges are measured as in RRT*-R: by Line-R in panels, and never below the chord.
     """
 
     spacing: float | None = None
@@ -66,24 +66,32 @@ class Dijkstra:
 
     @property
     def informed(self) -> bool:
-        """Is the search drawn towards the goal?"""
+        """Is the search directed at the goal?"""
         return False
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
         """Plan. ``callback`` sees the progress and stops the planner by returning True.
 
+        time_limit : seconds for this call; the lower of it and the option counts.
         Ctrl-C, too, ends the search, with the best path so far. ``samples`` are the vertices
         settled. Raises InputError where the spacing makes more nodes than can be numbered.
         """
-        return _search_grid(problem, self, callback)
+        limit = least_limit(self.time_limit, time_limit)
+        return _search_grid(problem, self, callback, limit)
 
 
 @dataclass(frozen=True, kw_only=True)
 class AStar(Dijkstra):
-    """As ``Dijkstra``, but towards the goal: A* with the chord (Hart, Nilsson, Raphael 1968).
+    """Dijkstra's algorithm, directed at the goal: A* (Hart, Nilsson and Raphael 1968).
 
-    No edge is shorter than its chord, so the chord to the goal is a consistent heuristic: the
-    cost is Dijkstra's, and fewer vertices are settled on the way to it.
+    Its heuristic is the chord to the goal. No edge is shorter than its chord, so the heuristic is
+    consistent: the cost is the same as Dijkstra's, and fewer vertices are settled.
     """
 
     @property
@@ -93,18 +101,18 @@ class AStar(Dijkstra):
 
     @property
     def informed(self) -> bool:
-        """Is the search drawn towards the goal?"""
+        """Is the search directed at the goal?"""
         return True
 
 
 def _offsets(neighbours: int) -> Integers:
-    """(neighbours, 2): columns and rows to every node that is seen past no other one."""
+    """(neighbours, 2): columns and rows to each neighbour; none lies behind another one."""
     steps = range(-REACH[neighbours], REACH[neighbours] + 1)
     return np.array([(i, j) for j in steps for i in steps if math.gcd(i, j) == 1], np.int64)
 
 
 def _nodes_around(lattice: Lattice, point: tuple[float, float], reach: int) -> Integers:
-    """First and last column, first and last row of the nodes at most so many cells away."""
+    """First and last column, first and last row of the nodes at most ``reach`` cells away."""
     s = (point[0] - lattice.bounds.x1_min) / lattice.dx
     t = (point[1] - lattice.bounds.x2_min) / lattice.dy
     columns = (math.ceil(s - reach), math.floor(s + reach))
@@ -115,7 +123,7 @@ def _nodes_around(lattice: Lattice, point: tuple[float, float], reach: int) -> I
 
 @dataclass
 class _Search:
-    """A running search: the graph, the clock and what was asked for."""
+    """A running search: the graph, the clock and the options."""
 
     problem: Problem
     planner: Dijkstra
@@ -123,6 +131,7 @@ class _Search:
     nodes: kernels.Nodes
     graph: kernels.Graph
     options: kernels.Options
+    time_limit: float | None  # seconds
     started: float = field(default_factory=time.perf_counter)
 
     @property
@@ -146,19 +155,22 @@ class _Search:
         return Progress(self.settled, len(self.graph.vertices), self.seconds, self.best_cost)
 
     def advance(self, most: int) -> None:
-        """Settle up to so many vertices."""
+        """Settle at most this many vertices."""
         surface, space = self.problem.surface.data, self.problem.free_space.data
         kernels.search(surface, space, self.nodes, self.graph, self.options, most)
 
     def sees_a_node(self, point: tuple[float, float], box: Integers) -> bool:
-        """Does a free segment lead from the point to a node of the box?"""
+        """Does a free segment lead from the point to a node of the box?
+
+        box : first and last column, first and last row.
+        """
         space = self.problem.free_space.data
         return bool(kernels.any_node_is_near(space, self.nodes, box, *point))
 
     def join(self, end: int, point: tuple[float, float]) -> bool:
-        """Join the start (0) or goal (1) to the nodes nearby; to those farther off if need be.
+        """Join the start (0) or goal (1) to the nodes nearby, or else to those farther away.
 
-        False where a free segment leads to no node at all.
+        False where no free segment leads to any node.
         """
         reach = REACH[self.planner.neighbours]
         while True:
@@ -172,7 +184,7 @@ class _Search:
 
 
 def _allocate(lattice: Lattice, surface: Surface) -> kernels.Graph:
-    """The arrays of a search. What it never comes to takes no memory: pages come at first use."""
+    """The arrays of a search. Parts that are never used take no memory."""
     size = lattice.nx * lattice.ny + 2
     try:
         return kernels.Graph(
@@ -188,8 +200,8 @@ def _allocate(lattice: Lattice, surface: Surface) -> kernels.Graph:
         ) from None
 
 
-def _prepare(problem: Problem, planner: Dijkstra) -> _Search:
-    """Open the start, and have the kernels loaded, or compiled, before the clock starts."""
+def _prepare(problem: Problem, planner: Dijkstra, time_limit: float | None) -> _Search:
+    """Open the start; so the kernels are loaded, or compiled, before the clock starts."""
     lattice = Lattice.spanning(problem.bounds, planner.spacing or problem.default_spacing)
     nodes = kernels.Nodes(
         x=lattice.x,
@@ -205,7 +217,7 @@ def _prepare(problem: Problem, planner: Dijkstra) -> _Search:
         informed=planner.informed,
         direct=cells_apart <= REACH[planner.neighbours],
     )
-    search = _Search(problem, planner, lattice, nodes, graph, options)
+    search = _Search(problem, planner, lattice, nodes, graph, options, time_limit)
     kernels.begin(problem.surface.data, graph, options, *problem.start, *problem.goal)
     search.advance(0)
     search.sees_a_node(problem.start, NO_NODES)
@@ -220,10 +232,10 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
     if search.graph.vertices[search.goal]["slot"] == kernels.DONE:
         return "goal settled"
     if search.graph.counters[kernels.OPEN] == 0:
-        return "no way on from the nodes reached"
+        return "no path on from the nodes reached"
     if stopped:
         return "callback"
-    limit = search.planner.time_limit
+    limit = search.time_limit
     return "time limit" if limit is not None and progress.seconds >= limit else ""
 
 
@@ -243,23 +255,23 @@ def _run(search: _Search, callback: Callback | None) -> str:
 
 
 def _path(search: _Search) -> Path | None:
-    """The way back from the goal; straight runs become one segment where that is as free."""
+    """The path to the goal; straight runs become one segment where that is free."""
     if math.isinf(search.best_cost):
         return None
     vertices = search.graph.vertices
-    way = [search.goal]
-    while (parent := int(vertices[way[-1]]["parent"])) >= 0:
-        way.append(parent)
-    points = search.graph.places[way[::-1], : trees.COST]
+    visited = [search.goal]
+    while (parent := int(vertices[visited[-1]]["parent"])) >= 0:
+        visited.append(parent)
+    points = search.graph.places[visited[::-1], : trees.COST]
     # A start or goal that lies on a node is a vertex twice.
     points = points[np.append((points[1:] != points[:-1]).any(axis=1), True)]
     bends = points[_are_bends(points)]
-    as_free = search.problem.free_space.segments_are_free(bends[:-1], bends[1:]).all()
-    return search.problem.path(bends if as_free else points)
+    are_free = search.problem.free_space.segments_are_free(bends[:-1], bends[1:]).all()
+    return search.problem.path(bends if are_free else points)
 
 
 def _are_bends(points: Array) -> npt.NDArray[np.bool_]:
-    """(m,), which points of a polyline (m, 2) are its ends or do not lie on a straight run."""
+    """(m,), which points of a polyline (m, 2) are its ends, or points where it turns."""
     steps = np.diff(points, axis=0)
     dx, dy = steps.T / np.hypot(*steps.T)
     bends = np.ones(len(points), np.bool_)
@@ -278,12 +290,14 @@ def _counters(graph: kernels.Graph) -> dict[str, int]:
     return {name: int(graph.counters[place]) for name, place in places.items()}
 
 
-def _search_grid(problem: Problem, planner: Dijkstra, callback: Callback | None) -> Solution:
-    """Search from the start until the goal is settled or the planner or callback say stop."""
+def _search_grid(
+    problem: Problem, planner: Dijkstra, callback: Callback | None, time_limit: float | None
+) -> Solution:
+    """Search until the goal is settled, the time is up, or the callback stops it."""
     answer = answer_without_search(problem, planner.name)
     if answer is not None:
         return answer
-    search = _prepare(problem, planner)
+    search = _prepare(problem, planner, time_limit)
     stopped_by = _run(search, callback)
     seconds = search.seconds
     path = _path(search)

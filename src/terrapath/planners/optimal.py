@@ -1,4 +1,4 @@
-"""The best answer there is: candidates from fast marching, refined, with a certificate."""
+"""The best solution there is: candidates from fast marching, refined, with a certificate."""
 
 from __future__ import annotations
 
@@ -10,21 +10,30 @@ from ..distance.field import DistanceField, Medium, march_from
 from ..geodesics.alternatives import routes_of_fields, shortest
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, Stopper, answer_without_search, lattices
-from .finished import bounded
+from .base import (
+    INTERRUPT,
+    Callback,
+    Progress,
+    Stopper,
+    answer_without_search,
+    lattices,
+    least_limit,
+)
+from .finished import with_bound
 
 
 @dataclass(frozen=True, kw_only=True)
 class Optimal:
     """Fast marching for the candidates, refinement for the digits, a certificate for proof.
 
-    target_gap : (length - lower bound) / lower bound to reach. routes : locally shortest
-    routes to look for; the shortest is the answer, the others are its alternatives.
+    target_gap : (length - lower bound) / lower bound to reach. routes : how many locally
+    shortest routes to look for. The shortest is the path, the others are its alternatives.
     spacing : of the nodes on which routes are searched, map units; by default a 250th of the
-    region's longer side. time_limit : seconds, looked at between the stages.
+    region's longer side, or a cell of the map where that is less. time_limit : seconds, checked
+    between the stages.
 
-    ``stopped_by`` says whether the gap was met; ``unrefined`` is the path down the distance
-    field, and all there is where the search was stopped before its routes were refined.
+    ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
+    field; it is also the path returned where the run ends before a route was refined.
     """
 
     target_gap: float = 1e-3
@@ -43,22 +52,30 @@ class Optimal:
         """The planner's name on the command line."""
         return "optimal"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
         """Plan. ``callback`` sees the progress and stops the planner by returning True.
 
+        time_limit : seconds for this call; the lower of it and the option counts.
         Ctrl-C, too, ends the search, with the best path and the best bound so far.
         """
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
-        return _Run(self, problem, callback).solve()
+        stopper = Stopper(callback, least_limit(self.time_limit, time_limit))
+        return _Run(self, problem, stopper).solve()
 
 
 class _Run:
-    """One run, and what was found so far."""
+    """One run, and what it has found so far."""
 
-    def __init__(self, planner: Optimal, problem: Problem, callback: Callback | None) -> None:
+    def __init__(self, planner: Optimal, problem: Problem, stopper: Stopper) -> None:
         self.planner, self.problem = planner, problem
-        self.stopper = Stopper(callback, planner.time_limit)
+        self.stopper = stopper
         self.samples, self.total = 0, 0
         self.direct: Path | None = None
         self.routes: tuple[Path, ...] = ()
@@ -77,7 +94,7 @@ class _Run:
         if solution.path is None or self.stopper.stopped_by:
             return solution
         target = self.planner.target_gap
-        solution = bounded(solution, target_gap=target, callback=self.stopper.must_stop)
+        solution = with_bound(solution, target_gap=target, callback=self.stopper.must_stop)
         if solution.status is Status.INTERRUPTED:
             return solution
         met = solution.gap is not None and solution.gap <= target
@@ -85,7 +102,7 @@ class _Run:
         return replace(solution, stopped_by=reason)
 
     def find_routes(self) -> None:
-        """The locally shortest routes, on a finer lattice where a coarse one shows none."""
+        """Find the locally shortest routes, on a finer lattice where a coarse one shows none."""
         problem = self.problem
         for lattice in lattices(problem, self.planner.spacing):
             self.total = self.samples + 2 * lattice.nx * lattice.ny
@@ -108,7 +125,7 @@ class _Run:
         return field
 
     def refine_routes(self, from_start: DistanceField, from_goal: DistanceField) -> None:
-        """Keep each route once it is refined, whatever happens to those that come after it."""
+        """Refine the routes; each is kept as soon as it is done, whatever happens later."""
         problem, count = self.problem, self.planner.routes
         found: list[Path] = []
         failures: list[Exception] = []
@@ -122,7 +139,7 @@ class _Run:
                 must_stop=self.must_stop,
             ):
                 if failures and not found:
-                    # The direct way, which comes first, could not be refined, but it is a way.
+                    # The first route could not be refined, but it is a path all the same.
                     found.extend(self.routes)
                 found.append(route)
                 self.routes = shortest(found, count)
@@ -134,7 +151,7 @@ class _Run:
             tell_unfinished(some if found else none, failures[0])
 
     def answer(self) -> Solution:
-        """What was found, without a bound."""
+        """What was found, without a lower bound."""
         path = self.routes[0] if self.routes else None
         status = Status.NOT_FOUND if path is None else Status.SOLVED
         return Solution(
@@ -145,7 +162,7 @@ class _Run:
             cost=None if path is None else path.length,
             seconds=self.stopper.seconds,
             samples=self.samples,
-            stopped_by=self.stopper.stopped_by or "no way between the nodes",
+            stopped_by=self.stopper.stopped_by or "no path between the nodes",
             unrefined=None if path is self.direct else self.direct,
             alternatives=self.routes[1:],
         )

@@ -1,56 +1,68 @@
-"""Planners by their names."""
+"""Planners by their names; each is loaded when it is first asked for."""
 
 from __future__ import annotations
 
 import dataclasses
 import difflib
-from collections.abc import Callable
-from functools import cache, partial
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from ..problem import Problem, Solution
-from .base import Callback, Planner
-from .fast_marching import FastMarching
-from .finished import Finished, finish
-from .geodesic_traversal import GeodesicTraversal
-from .grid_search import AStar, Dijkstra
-from .optimal import Optimal
-from .rrt import RRT
-from .rrt_star import RRTStar
 
-__all__ = ["PLANNERS", "finish", "make_finished", "make_planner", "plan"]
+if TYPE_CHECKING:
+    from ..problem import Problem, Solution
+    from .base import Callback, Planner
+    from .finished import Finished
 
-PLANNERS: dict[str, Callable[..., Planner]] = {
-    "rrt-star-r": partial(RRTStar, metric="riemannian"),
-    "rrt-star": partial(RRTStar, metric="chord"),
-    "rrt": RRT,
-    "dijkstra": Dijkstra,
-    "a-star": AStar,
-    "fast-marching": FastMarching,
-    "geodesic-traversal": GeodesicTraversal,
-    "optimal": Optimal,
+__all__ = ["PLANNERS", "make_finished", "make_planner", "plan"]
+
+# For each name the module and its class, and the options that the name stands for.
+_REGISTERED: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "rrt-star-r": ("rrt_star", "RRTStar", {"metric": "riemannian"}),
+    "rrt-star": ("rrt_star", "RRTStar", {"metric": "chord"}),
+    "rrt": ("rrt", "RRT", {}),
+    "dijkstra": ("grid_search", "Dijkstra", {}),
+    "a-star": ("grid_search", "AStar", {}),
+    "fast-marching": ("fast_marching", "FastMarching", {}),
+    "geodesic-traversal": ("geodesic_traversal", "GeodesicTraversal", {}),
+    "optimal": ("optimal", "Optimal", {}),
 }
 
 
-@cache
-def _options(factory: Callable[..., Planner]) -> list[str]:
-    """Names of the options of a planner that its registered name leaves open."""
-    kind: Any = factory
-    fixed: dict[str, Any] = {}
-    if isinstance(factory, partial):
-        kind, fixed = factory.func, factory.keywords
-    return [field.name for field in dataclasses.fields(kind) if field.name not in fixed]
+class _Planners(Mapping[str, Callable[..., "Planner"]]):
+    """What makes a planner from its options, by the planner's name."""
+
+    def __getitem__(self, name: str) -> Callable[..., Planner]:
+        module, kind, fixed = _REGISTERED[name]
+        return partial(getattr(import_module(f".{module}", __package__), kind), **fixed)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_REGISTERED)
+
+    def __len__(self) -> int:
+        return len(_REGISTERED)
+
+
+PLANNERS: Mapping[str, Callable[..., Planner]] = _Planners()
+
+
+def _options(name: str) -> list[str]:
+    """The names of the options that may be given to the planner of that name."""
+    factory: Any = PLANNERS[name]
+    fields = dataclasses.fields(factory.func)
+    return [field.name for field in fields if field.name not in factory.keywords]
 
 
 def make_planner(name: str, **options: Any) -> Planner:
     """The planner of that name with the given options.
 
-    Raises InputError for a name or an option that is not known, with the nearest known.
+    Raises InputError for a name or an option that is not known, and names the nearest known.
     """
     if name not in PLANNERS:
         raise InputError(f"planner={name!r} is not known; choose one of {', '.join(PLANNERS)}")
-    known = _options(PLANNERS[name])
+    known = _options(name)
     for option in options:
         if option not in known:
             near = difflib.get_close_matches(option, known, n=1)
@@ -67,12 +79,14 @@ def make_finished(
     target_gap: float | None = None,
     **options: Any,
 ) -> Finished:
-    """The planner of that name, its answers refined and bounded as asked; see ``Finished``.
+    """The planner of that name, its solutions refined and bounded as asked; see ``Finished``.
 
-    A time limit among the planner's options is the finishing's too, and a planner that knows
-    a target gap takes care of it by itself.
+    A time limit among the options holds for the planner and the finishing together. A planner
+    that has an option ``target_gap`` meets the gap itself.
     """
-    if target_gap is not None and name in PLANNERS and "target_gap" in _options(PLANNERS[name]):
+    from .finished import Finished
+
+    if target_gap is not None and name in PLANNERS and "target_gap" in _options(name):
         options["target_gap"], target_gap = target_gap, None
     return Finished(
         planner=make_planner(name, **options),
@@ -93,12 +107,14 @@ def plan(
     callback: Callback | None = None,
     **options: Any,
 ) -> Solution:
-    """Solve a problem with any planner by its name; options as keywords.
+    """Solve a problem with any planner by its name; its options as keywords.
 
-    refine : take the path to the locally shortest one. bound : prove a lower bound on every
-    path's length. target_gap : refine the bound until (length - bound) / bound is met, which
-    asks for a bound; ``optimal`` does all three by itself. ``callback`` sees the progress of
-    each stage, and stops the planner or the bound by returning True.
+    refine : take the path to the locally shortest one. bound : prove a lower bound on the
+    length of every path. target_gap : improve the bound until (length - bound) / bound is no
+    more than this; it implies ``bound``. ``optimal`` does all three by itself.
+    ``callback`` sees the progress of each stage, and stops the planner or the search for a
+    bound by returning True.
+    Raises InputError for a name, an option or a value that is not known.
     """
     chosen = make_finished(planner, refine=refine, bound=bound, target_gap=target_gap, **options)
     return chosen.solve(problem, callback=callback)

@@ -1,4 +1,4 @@
-"""Plain RRT: the first path, fast, with no claim to be short."""
+"""Plain RRT: the first path it finds, fast; it need not be short."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..problem import Problem, Solution
 from ..validation import require_count, require_fraction, require_positive, require_seed
-from .base import Callback
+from .base import Callback, least_limit
 from .tree_search import TreeOptions, search_tree
 
 
@@ -15,11 +15,12 @@ from .tree_search import TreeOptions, search_tree
 class RRT:
     """Plain RRT: RRT* without neighbours (LaValle 1998).
 
-    It ends within 512 samples of the first path: so many are taken between two looks at it.
+    It ends within 512 samples of the first path, because it looks for a path only after each
+    512 samples.
 
-    samples : at most this many. step : longest edge, map units; by default a twelfth of
-    the region's side. seed : of the one random generator. goal_bias : share of samples
-    that are the goal. time_limit : seconds.
+    samples : at most this many are drawn. step : longest edge, map units; by default a twelfth
+    of the region's side. seed : of the random generator. goal_bias : share of samples that are
+    the goal. time_limit : seconds.
     """
 
     samples: int = 10_000
@@ -41,8 +42,17 @@ class RRT:
         """The planner's name on the command line."""
         return "rrt"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
-        """Plan. ``callback`` sees the progress and stops the planner by returning True."""
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
+        """Plan. ``callback`` sees the progress and stops the planner by returning True.
+
+        time_limit : seconds for this call; the lower of it and the option counts.
+        """
         options = TreeOptions(
             planner=self.name,
             samples=int(self.samples),
@@ -53,7 +63,7 @@ class RRT:
             riemannian=True,
             prune=True,
             informed=False,
-            time_limit=self.time_limit,
+            time_limit=least_limit(self.time_limit, time_limit),
             target_length=math.inf,
         )
         return search_tree(problem, options, callback)

@@ -14,7 +14,7 @@ from ..validation import (
     require_positive,
     require_seed,
 )
-from .base import Callback
+from .base import Callback, least_limit
 from .tree_search import TreeOptions, search_tree
 
 
@@ -22,23 +22,23 @@ from .tree_search import TreeOptions, search_tree
 class RRTStar:
     """RRT*-R: RRT* with edges measured under h (paper, Algorithms 1 to 3).
 
-    samples : samples drawn.
+    samples : how many are drawn.
     step : longest edge, map units; by default a twelfth of the region's side.
     metric : "riemannian" measures edges by Line-R; "chord" by the Euclidean distance in
         R^n; with ``informed=False`` that is the original RRT*, the paper's baseline.
-    seed : of the one random generator; the same seed gives the same tree, to the last bit.
-    radius_factor : how many times the radius that optimality needs in theory.
+    seed : of the random generator; the same seed gives the same tree, to the last bit.
+    radius_factor : the search radius, as a multiple of the least one that optimality needs.
     goal_bias : share of samples that are the goal, until it is reached.
-    informed : begin with the straight way; then leave out samples that cannot improve the
-        best path, by the chord bound (Gammell et al. 2014), and draw 0.3 of them beside it
-        (Akgun and Stilman 2011); hang vertices below their parents' parents where that is
-        shorter (Jeong et al. 2019). ``False`` does as the paper: it samples all of the region.
-    prune : leave out edges that the chord rules out; the tree is the same without.
-    panel : longest stretch that one application of Line-R measures, map units; by default
-        as long as the surface's features allow; ``math.inf`` is Algorithm 1 to the letter.
-    time_limit : seconds. target_length : stop at a cost this low, map units.
+    informed : begin with the straight line to the goal. Then leave out samples that cannot
+        improve the best path, by their chords (Gammell et al. 2014), and draw 0.3 of them near
+        it (Akgun and Stilman 2011). Hang vertices below their parents' parents where that is
+        shorter (Jeong et al. 2019). With ``False`` all of the region is sampled, as in the paper.
+    prune : do not measure edges whose chord is already too long; the tree stays the same.
+    panel : longest piece of an edge that one application of Line-R measures, map units; by
+        default as long as the surface's features allow; ``math.inf`` is exactly Algorithm 1.
+    time_limit : seconds. target_length : stop when the cost is this low, map units.
 
-    Source: the paper, with what it leaves open told in ``_kernels/rrt_star.py``.
+    Source: the paper. What it leaves open is described in ``_kernels/planners/rrt_star.py``.
     """
 
     samples: int = 10_000
@@ -74,14 +74,21 @@ class RRTStar:
         """The planner's name on the command line."""
         return "rrt-star-r" if self.metric == "riemannian" else "rrt-star"
 
-    def solve(self, problem: Problem, *, callback: Callback | None = None) -> Solution:
+    def solve(
+        self,
+        problem: Problem,
+        *,
+        callback: Callback | None = None,
+        time_limit: float | None = None,
+    ) -> Solution:
         """Plan. ``callback`` sees the progress and stops the planner by returning True.
 
+        time_limit : seconds for this call; the lower of it and the option counts.
         Ctrl-C, too, ends the search with the best path so far.
         """
-        return search_tree(problem, self._tree_options(), callback)
+        return search_tree(problem, self._tree_options(time_limit), callback)
 
-    def _tree_options(self) -> TreeOptions:
+    def _tree_options(self, time_limit: float | None = None) -> TreeOptions:
         return TreeOptions(
             planner=self.name,
             samples=int(self.samples),
@@ -93,6 +100,6 @@ class RRTStar:
             prune=self.prune,
             informed=self.informed,
             panel=self.panel,
-            time_limit=self.time_limit,
+            time_limit=least_limit(self.time_limit, time_limit),
             target_length=self.target_length or 0.0,
         )

@@ -6,32 +6,52 @@ import math
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..problem import Path, Problem, Solution, Status
 from ..surface import metric
-from .base import INTERRUPT, SEPARATED, Callback, Planner, Progress, without_path
+from ..validation import Point, PointLike
+from .base import (
+    INTERRUPT,
+    SEPARATED,
+    Callback,
+    Planner,
+    Progress,
+    limit_of,
+    solve_within,
+    without_path,
+)
+from .finished import Finished
 
-# From best to worst: a tour ends as its worst leg does.
-_WORSE = (Status.SOLVED, Status.NOT_FOUND, Status.INTERRUPTED, Status.UNREACHABLE)
+# From best to worst. A tour has the status of its worst leg.
+_STATUSES = (Status.SOLVED, Status.NOT_FOUND, Status.INTERRUPTED, Status.UNREACHABLE)
+
+# A leg is given no less time than this, seconds: a limit must be above 0.
+_LEAST_SECONDS = 1e-3
 
 
 def plan_tour(
-    problem: Problem, planner: Planner, via: Sequence[Any] = (), *, callback: Callback | None = None
+    problem: Problem,
+    planner: Planner,
+    via: Sequence[PointLike] = (),
+    *,
+    callback: Callback | None = None,
 ) -> Solution:
-    """From the problem's start through the points of ``via``, in order, to its goal.
+    """Plan from the problem's start through the points of ``via``, in order, to its goal.
 
-    The answer's path is that of all legs, one after another; its length, cost and lower bound
-    are their sums, for every path through these points is made of such legs. A leg that is
-    proven unreachable is found out before anything is planned, and planning ends with the
-    first leg that has no path, or that was interrupted. Then the tour has a path only if the
-    goal was reached, so a route that is written is always whole; ``legs`` holds what there is.
-    A planner's time limit holds for all legs together.
+    via : (x1, x2) each, map units. The part of the route between two stops is a leg. The path
+    returned is that of all legs, one after another. Its length, cost and lower bound are the
+    sums over the legs, because every path through these points is made of such legs.
+    The planner's time limit holds for all legs together.
+
+    Where some leg is proven unreachable, nothing is planned. Planning ends after the first leg
+    that has no path or was interrupted; ``legs`` then holds those planned so far. The tour has
+    a path only if it leads to the goal.
+    Raises InputError for a waypoint that is not free or outside the bounds.
     """
     return _Tour(problem, planner, callback, 1).solve([*via, problem.goal])
 
@@ -40,11 +60,12 @@ def plan_tour(
 class GoalAnswer:
     """What is known of one of several goals.
 
-    least : no way to this goal is shorter, map units; infinite where it is unreachable.
-    solution : None where nothing was planned, for ``least`` is no less than the best length.
+    goal : (x1, x2), map units. least : a lower bound on the length of every path to this goal,
+    map units; infinite where it is unreachable. solution : None where nothing was planned,
+    because ``least`` is no less than the length to a nearer goal.
     """
 
-    goal: tuple[float, float]
+    goal: Point
     least: float
     solution: Solution | None
 
@@ -52,17 +73,19 @@ class GoalAnswer:
 def plan_goals(
     problem: Problem,
     planner: Planner,
-    goals: Sequence[Any],
-    via: Sequence[Any] = (),
+    goals: Sequence[PointLike],
+    via: Sequence[PointLike] = (),
     *,
     every: bool = False,
     callback: Callback | None = None,
 ) -> tuple[GoalAnswer, ...]:
     """What is known of each goal, in the order given, from the start through ``via``.
 
-    Goals are planned to from the nearest by chord on, and one whose chord is no less than the
-    best length so far is left out, unless ``every`` is True. The legs to the last
-    waypoint are the same for all and planned once. Ctrl-C ends it with what was found.
+    goals, via : (x1, x2) each, map units. Goals are planned to in the order of their chords,
+    the shortest first. A goal whose chord is no less than the best length so far is left out,
+    unless ``every`` is True. The legs to the last waypoint are the same for all goals, and
+    planned once. After Ctrl-C the goals planned to so far are kept.
+    Raises InputError where there is no goal, or a point is not free or outside the bounds.
     """
     if not goals:
         raise InputError("goals=[] names no goal; give at least one")
@@ -86,16 +109,17 @@ def plan_goals(
 
 
 def nearest(answers: Iterable[GoalAnswer]) -> Solution:
-    """The shortest route of all; where there is none, the answer that still leaves most open.
+    """The solution with the shortest path to any of the goals.
 
-    Its lower bound is the least of all goals': no way to any of them is shorter.
+    Its lower bound is the least of all goals': no path to any of them is shorter. Where no goal
+    has a path, it is an interrupted solution, or else one that was not proven unreachable.
     """
     known = list(answers)
     planned = [answer.solution for answer in known if answer.solution is not None]
-    ways = [solution for solution in planned if solution.length is not None]
-    if not ways:
-        return max(planned, key=lambda s: (s.status is Status.INTERRUPTED, _openness(s)))
-    best = min(ways, key=lambda solution: solution.length or 0.0)
+    found = [solution for solution in planned if solution.length is not None]
+    if not found:
+        return max(planned, key=lambda s: (s.status is Status.INTERRUPTED, -_badness(s)))
+    best = min(found, key=lambda solution: solution.length or 0.0)
     stopped = any(solution.status is Status.INTERRUPTED for solution in planned)
     if stopped and best.status is Status.SOLVED:
         best = replace(best, status=Status.INTERRUPTED, stopped_by=INTERRUPT)
@@ -104,16 +128,16 @@ def nearest(answers: Iterable[GoalAnswer]) -> Solution:
     return replace(best, lower_bound=min(answer.least for answer in known))
 
 
-def _openness(solution: Solution) -> int:
-    return -_WORSE.index(solution.status)
+def _badness(solution: Solution) -> int:
+    return _STATUSES.index(solution.status)
 
 
-def _goal_name(goals: Sequence[Any], k: int) -> str:
+def _goal_name(goals: Sequence[PointLike], k: int) -> str:
     return "goal" if len(goals) == 1 else f"goal {k + 1}"
 
 
 def _least(chord: float, solution: Solution | None) -> float:
-    """No way to the goal is shorter than this."""
+    """A lower bound on the length of every path to a goal with this chord."""
     if solution is None:
         return chord
     if solution.status is Status.UNREACHABLE:
@@ -123,7 +147,10 @@ def _least(chord: float, solution: Solution | None) -> float:
 
 
 class _Tour:
-    """Legs as they are planned, each once."""
+    """The legs of one or several tours, each planned once.
+
+    goals : how many goals there are to plan to.
+    """
 
     def __init__(
         self, problem: Problem, planner: Planner, callback: Callback | None, goals: int
@@ -131,18 +158,18 @@ class _Tour:
         self.problem, self.planner, self.callback = problem, planner, callback
         self.goals = goals
         self.started = time.perf_counter()
-        self.planned: dict[tuple[Any, Any], Solution] = {}
+        self.planned: dict[tuple[Point, Point], Solution] = {}
 
-    def checked(self, via: Sequence[Any]) -> list[tuple[float, float]]:
-        """The waypoints, in free space."""
+    def checked(self, via: Sequence[PointLike]) -> list[Point]:
+        """The waypoints; InputError where one is not in free space."""
         start = self.problem.start
         return [
             self.problem.between(start, point, ("start", f"via {k}")).goal
             for k, point in enumerate(via, start=1)
         ]
 
-    def solve(self, stops: Sequence[Any]) -> Solution:
-        """Through all the stops; the last is the goal."""
+    def solve(self, stops: Sequence[PointLike]) -> Solution:
+        """Plan through all the stops, of which the last is the goal."""
         points = [self.problem.start, *self.checked(stops[:-1]), stops[-1]]
         whole = self.problem.between(self.problem.start, stops[-1])
         legs = [whole.between(a, b) for a, b in pairwise(points)]
@@ -160,30 +187,32 @@ class _Tour:
         return joined(whole, solutions, len(legs))
 
     def leg(self, leg: Problem, number: int, count: int) -> Solution:
-        """One leg, or what is known of it already."""
+        """The solution of one leg, which is planned where it was not before."""
         ends = (leg.start, leg.goal)
         if ends not in self.planned:
-            planner = self.with_share(count)
             try:
-                self.planned[ends] = planner.solve(leg, callback=self.watch(number, count))
+                self.planned[ends] = self.plan(
+                    leg, count - 1 + self.goals, self.watch(number, count)
+                )
             except KeyboardInterrupt:  # between the leg before and this one
-                return without_path(leg, planner.name, Status.INTERRUPTED, INTERRUPT)
+                return without_path(leg, self.planner.name, Status.INTERRUPTED, INTERRUPT)
         return self.planned[ends]
 
-    def with_share(self, count: int) -> Planner:
-        """The planner with its share of the time that is left."""
-        legs = count - 1 + self.goals
-        limit = getattr(self.planner, "time_limit", None)
-        if limit is None:
-            shared: Planner = _with_equal_share(self.planner, legs)
-            return shared
-        open_legs = max(legs - len(self.planned), 1)
-        left = limit - (time.perf_counter() - self.started)
-        limited: Planner = _limited(self.planner, max(left, 1e-3) / open_legs)
-        return limited
+    def plan(self, leg: Problem, legs: int, callback: Callback | None) -> Solution:
+        """Plan one of ``legs`` legs, within its share of the planner's time limit."""
+        planner, limit = self.planner, limit_of(self.planner)
+        if limit is not None:
+            left = max(limit - (time.perf_counter() - self.started), _LEAST_SECONDS)
+            share = left / max(legs - len(self.planned), 1)
+            return solve_within(planner, leg, callback, share)
+        if isinstance(planner, Finished) and (limit := limit_of(planner.planner)) is not None:
+            # The clock counts finishing too, so it does not show what is left of the search's
+            # time: all legs get the same.
+            return planner.solve(leg, callback=callback, search_limit=limit / legs)
+        return solve_within(planner, leg, callback, None)
 
     def watch(self, number: int, count: int) -> Callback | None:
-        """The callback, told which leg it sees."""
+        """The callback, with the leg named in each progress that it sees."""
         callback = self.callback
         if callback is None or count * self.goals == 1:
             return callback
@@ -195,38 +224,12 @@ class _Tour:
         return see
 
 
-def _with_equal_share(planner: Any, legs: int) -> Any:
-    """A planner whose limit, its own or that of the planner within it, is shared by the legs.
-
-    Equally: where only the planner within has a limit, finishing has none, and the clock does
-    not tell how much of the planner's time is left.
-    """
-    limit = getattr(planner, "time_limit", None)
-    if limit is not None:
-        return _limited(planner, limit / legs)
-    if "planner" not in _fields(planner):
-        return planner
-    return replace(planner, planner=_with_equal_share(planner.planner, legs))
-
-
-def _limited(planner: Any, seconds: float) -> Any:
-    """A planner with another time limit, and so the planner within it."""
-    names = _fields(planner)
-    changes: dict[str, Any] = {}
-    if "time_limit" in names:
-        changes["time_limit"] = seconds
-    if "planner" in names:
-        changes["planner"] = _limited(planner.planner, seconds)
-    return replace(planner, **changes) if changes else planner
-
-
-def _fields(planner: Any) -> set[str]:
-    return {entry.name for entry in fields(planner)} if is_dataclass(planner) else set()
-
-
 def joined(problem: Problem, legs: Sequence[Solution], count: int) -> Solution:
-    """Legs one after another as the answer to one problem; ``count`` were to be planned."""
-    worst = max(legs, key=lambda leg: _WORSE.index(leg.status))
+    """The solution made of legs, one after another.
+
+    problem : from the first start to the last goal. count : legs that were to be planned.
+    """
+    worst = max(legs, key=_badness)
     is_whole = len(legs) == count and all(leg.path is not None for leg in legs)
     counters: Counter[str] = Counter()
     for leg in legs:
@@ -246,11 +249,10 @@ def joined(problem: Problem, legs: Sequence[Solution], count: int) -> Solution:
         counters=dict(counters),
         legs=tuple(legs),
     )
-    bounds = [leg.lower_bound for leg in legs]
-    if solution.length is None or any(bound is None for bound in bounds):
+    proven = [leg.lower_bound for leg in legs if leg.lower_bound is not None]
+    if solution.length is None or len(proven) < len(legs):
         return solution
-    least = min(sum(bound or 0.0 for bound in bounds), solution.length)  # rounding apart
-    return replace(solution, lower_bound=least)
+    return replace(solution, lower_bound=min(sum(proven), solution.length))  # rounding apart
 
 
 def _reasons(legs: Sequence[Solution], count: int) -> str:

@@ -19,11 +19,11 @@ from .base import INTERRUPT, Callback, Progress, answer_without_search
 # Samples between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 512
 
-# Samples that are taken in the order in which they were drawn: few vertices are in the
-# processor's cache in any order.
+# The first samples keep the order in which they were drawn: the tree is still so small that
+# another order would not help the processor's cache.
 UNORDERED = 2048
 
-# An edge is measured by one application of Line-R up to this many features of the surface.
+# One application of Line-R measures a piece that is at most this many features of the surface long.
 FEATURES_PER_PANEL = 4.0
 
 # The default step is this share of the side of a square as large as the bounds: 1.0 in the
@@ -33,20 +33,20 @@ STEPS_PER_SIDE = 12.0
 
 @dataclass(frozen=True, kw_only=True)
 class TreeOptions:
-    """What a tree planner hands to the shared loop."""
+    """The options of a tree planner; see ``RRTStar``."""
 
-    planner: str
-    samples: int
-    step: float | None
-    radius_factor: float
+    planner: str  # its name
+    samples: int  # at most this many
+    step: float | None  # map units, None for the default
+    radius_factor: float  # 0 for a tree that is never rewired
     goal_bias: float
     seed: int
-    riemannian: bool
+    riemannian: bool  # edges are measured by Line-R, not by the chord
     prune: bool
     informed: bool
-    panel: float | None = None
-    time_limit: float | None = None
-    target_length: float = 0.0
+    panel: float | None = None  # map units, None for the default
+    time_limit: float | None = None  # seconds
+    target_length: float = 0.0  # map units; infinite to stop at the first path
 
 
 def default_step(problem: Problem) -> float:
@@ -76,15 +76,15 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
 
 def _allocate(samples: int, surface: Surface) -> trees.Tree:
     size = samples + 2  # the start, and the goal that may join with the last sample
-    room = size // 2 + 64  # for buckets
+    most = size // 2 + 64  # buckets
     return trees.Tree(
         places=np.empty((size, trees.LIFTED + len(surface.layers))),
         vertices=np.empty(size, trees.TENSOR),
         links=np.empty(size, trees.LINK),
         counters=np.zeros(trees.COUNTERS, np.int64),
         buckets=Buckets(
-            first=np.empty(room + 1, np.int32),
-            head=np.empty(room, np.int32),
+            first=np.empty(most + 1, np.int32),
+            head=np.empty(most, np.int32),
             next=np.empty(size, np.int32),
             frame=np.zeros(3),
             shape=np.zeros(2, np.int64),
@@ -123,7 +123,7 @@ class _Search:
         return int(self.tree.counters[trees.SAMPLES])
 
     def note(self) -> Progress:
-        """Enter the state into the history and return it."""
+        """Add the progress to the history and return it."""
         progress = Progress(self.samples, self.options.samples, self.seconds, self.best_cost)
         self.rows.append((progress.samples, progress.seconds, progress.best_cost))
         return progress
@@ -135,7 +135,7 @@ class _Search:
 
 
 def _prepare(problem: Problem, tree: trees.Tree, settings: trees.Options) -> None:
-    """Plant the tree, and have the kernels loaded, or compiled, before the clock starts."""
+    """Plant the tree; so the kernels are loaded, or compiled, before the clock starts."""
     surface, space = problem.surface.data, problem.free_space.data
     kernels.grow(surface, space, tree, settings, np.empty((0, 3)))
 
@@ -156,9 +156,9 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
 
 
 def _side_by_side(draws: Array) -> Array:
-    """Put draws (m, 3) in an order in which those that follow each other lie near each other.
+    """Sort draws (m, 3) so that each one lies near the one before.
 
-    That is row by row, to and fro, in the square of their last two numbers.
+    Their last two numbers are a point in a square; the order is row by row, to and fro.
     """
     row = np.floor(draws[:, 2] * math.isqrt(len(draws)))
     column = np.where(row % 2 == 0, draws[:, 1], 1.0 - draws[:, 1])
@@ -168,10 +168,10 @@ def _side_by_side(draws: Array) -> Array:
 def _chunks(seed: int, samples: int) -> Iterator[Array]:
     """The uniform numbers (m, 3) that samples are drawn with, chunk by chunk.
 
-    They come in batches of a quarter of those before. In a batch the order is free, and the
-    vertices that one sample looks at are best looked at by the next, too, while they are in
-    the processor's cache. A batch is drawn whole even where it is not used up: fewer samples
-    make the beginning of the tree that more make, whatever the chunks.
+    They are drawn in batches; each is a quarter of all those before. Within a batch the order is
+    free, so samples that need the same vertices follow one another, while these are in the
+    processor's cache. A batch is always drawn whole. So a run with fewer samples grows the
+    beginning of the tree that a run with more samples grows.
     """
     random = np.random.Generator(np.random.PCG64(seed))
     batch = random.random((min(UNORDERED, samples), 3))
@@ -203,15 +203,15 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
     vertex = int(tree.counters[trees.GOAL])
     if vertex < 0:
         return None
-    way, parents = [], tree.links["parent"]
+    visited, parents = [], tree.links["parent"]
     while vertex >= 0:
-        way.append(vertex)
+        visited.append(vertex)
         vertex = int(parents[vertex])
-    return problem.path(tree.places[way[::-1], : trees.COST])
+    return problem.path(tree.places[visited[::-1], : trees.COST])
 
 
 def _search_tree(tree: trees.Tree) -> SearchTree:
-    """The vertices in the order in which they came."""
+    """The vertices in the order in which they were added."""
     count = int(tree.counters[trees.VERTICES])
     ages, parents = tree.links["age"][:count], tree.links["parent"][:count]
     by_age = np.argsort(ages)
@@ -234,7 +234,7 @@ def _counters(tree: trees.Tree) -> dict[str, int]:
 
 
 def search_tree(problem: Problem, options: TreeOptions, callback: Callback | None) -> Solution:
-    """Grow a tree from the start until the options or the callback say stop."""
+    """Grow a tree from the start until an option's limit is met or the callback stops it."""
     answer = answer_without_search(problem, options.planner, options.seed)
     if answer is not None:
         return answer

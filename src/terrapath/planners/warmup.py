@@ -15,7 +15,7 @@ import shapely
 
 from .._kernels import cache, compiler
 from .._support.files import written_whole
-from .._support.telling import collecting
+from .._support.telling import told_to
 from .._support.watching import Watch, watch_nothing
 from ..certificates.search import lower_bound
 from ..distance.field import distance_field
@@ -182,7 +182,7 @@ def warm_up(watch: Watch = watch_nothing) -> Warmth:
     if names is not None:
         return _warmth(directory, names, 0)
     before = cache.kept_files()
-    with collecting():  # of kernels that cannot be kept: that is the error below
+    with told_to(lambda warning: None):  # that kernels cannot be kept is the error below
         _rehearse_all(rehearsals(), watch)
     if (failure := cache.unkept()) is not None:
         raise MapError(failure)

@@ -1,4 +1,4 @@
-"""Figures."""
+"""Figures of routes and fields: maps, charts, 3-D views and pages."""
 
 import lazy_loader
 

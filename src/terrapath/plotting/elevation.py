@@ -31,7 +31,7 @@ def _draw_height(axes: Any, path: Path) -> None:
 
 
 def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None) -> None:
-    """Along the path, signed, and the steepest of the ground, both ways of zero."""
+    """The slope along the path, signed, and the ground's steepest slope on both sides of zero."""
     band = {"color": GROUND_COLOUR, "alpha": 0.35, "lw": 0}
     axes.fill_between(distance, -found.ground, found.ground, label="of the ground", **band)
     axes.plot(distance, found.along, color=PATH_COLOUR, lw=1.0, label="along the route")
@@ -43,7 +43,7 @@ def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None)
     axes.set_ylabel("slope (degrees)")
     axes.legend(fontsize=8, loc="upper right", ncols=3, framealpha=0.85)
     low, high = axes.get_ylim()
-    # Room for the limit's line below, and for the legend above.
+    # Leaves space for the limit's line below, and for the legend above.
     axes.set_ylim(low - 0.04 * (high - low), high + 0.25 * (high - low))
 
 
@@ -53,7 +53,7 @@ def _draw_layer(axes: Any, distance: Array, shown: Column) -> None:
 
 
 def _mark_vias(axes: Any, solution: Solution, path: Path) -> None:
-    """Where a leg ends: dashed lines, numbered on the first panel."""
+    """Dashed lines where legs end, numbered on the first panel."""
     for k, via in enumerate(solution.via, start=1):
         nearest = int(np.argmin(np.hypot(*(path.profile.points - via).T)))
         distance = path.profile.distance[nearest]

@@ -46,9 +46,9 @@ def draw_fan(axes: Any, problem: Problem, fan: Fan, shortest: Array) -> None:
 def draw_movement_fan(
     axes: Any, problem: Problem, rays: Sequence[Ray], movement: Array, pair: Sequence[Ray]
 ) -> None:
-    """Rays coloured by how far their ends move, (n,), map units a radian; the wildest on top.
+    """Rays coloured by how far their ends move, (n,), map units per radian; the largest on top.
 
-    pair : two neighbours in direction that part, drawn over the others.
+    pair : two rays of nearly the same direction that part, drawn over the others.
     """
     draw_ground(axes, problem, PALE)
     shown = np.arange(0, len(rays), -(-len(rays) // MOST_RAYS_DRAWN))
@@ -74,9 +74,9 @@ def draw_movement_fan(
 
 
 def draw_movement(axes: Any, angles: Array, movement: Array, length: float, exact: Array) -> None:
-    """End-point movement against direction, on a logarithmic scale.
+    """End-point movement by direction, on a logarithmic scale.
 
-    angles : (n,), radians. movement : (n,), map units a radian. length : of the rays, which
+    angles : (n,), radians. movement : (n,), map units per radian. length : of the rays, which
     is their movement on flat ground. exact : (k,), directions of the geodesics that end at
     the goal, the shortest first, radians.
     """

@@ -48,7 +48,7 @@ def _draw_lines(axes: Any, field: DistanceField, values: Array, unit: str) -> No
 
 
 def _hatch(axes: Any, field: DistanceField) -> None:
-    """Where no node was reached."""
+    """Hatch the region where no node was reached."""
     missing = ~np.isfinite(field.values)
     if missing.any():
         lattice = field.lattice
@@ -57,7 +57,7 @@ def _hatch(axes: Any, field: DistanceField) -> None:
 
 
 def draw_distances(axes: Any, field: DistanceField) -> None:
-    """Draw a field onto two-dimensional axes; what was not reached is hatched."""
+    """Draw a field onto two-dimensional axes; regions that were not reached are hatched."""
     problem = _as_problem(field)
     draw_ground(axes, problem, PALE, contours=False)
     values = np.ma.masked_invalid(field.values)

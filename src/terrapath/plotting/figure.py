@@ -34,7 +34,7 @@ def _title(solution: Solution) -> str:
         return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
     straight = solution.straight_length
     saved = 1.0 - length / straight if straight else 0.0
-    against = f"{abs(saved):.1%} {'shorter' if saved >= 0.0 else 'longer'} than the straight way"
+    against = f"{abs(saved):.1%} {'shorter' if saved >= 0.0 else 'longer'} than the straight line"
     refined = "" if solution.unrefined is None else ", refined"
     title = (
         f"{name}{solution.planner}{refined}, length {format_length(length, unit)} "
@@ -44,7 +44,7 @@ def _title(solution: Solution) -> str:
         return title
     bound = format_length(solution.lower_bound, unit)
     gap = f"{100.0 * solution.gap:.3g} %"
-    return f"{title}\nproven: {solution.bounded} than {bound}, a gap of {gap}"
+    return f"{title}\nproven: {solution.bound_in_words} than {bound}, a gap of {gap}"
 
 
 def draw_route(solution: Solution) -> Any:
@@ -89,23 +89,23 @@ def draw_profile(solution: Solution) -> Any:
 
 
 def require_known_picture(path: Path) -> None:
-    """Raise MapError for an ending that is no picture format."""
+    """Raise MapError for a suffix that is no picture format."""
     if path.suffix.lower() not in FORMATS:
         raise MapError(f"{path} has no known picture format; end it in {', '.join(FORMATS)}")
 
 
 def plot_route(solution: Solution, path: str | Path) -> None:
-    """Draw a solution into a picture file, whole or not at all."""
+    """Draw a solution to a picture file, completely or not at all."""
     _save(lambda: draw_route(solution), Path(path))
 
 
 def plot_profile(solution: Solution, path: str | Path) -> None:
-    """Draw the elevation and slope profile of a route into a picture file, whole or not at all."""
+    """Draw a route's profile of heights and slopes to a picture file, completely or not at all."""
     _save(lambda: draw_profile(solution), Path(path))
 
 
 def plot_field(field: DistanceField, path: str | Path) -> None:
-    """Draw a distance field into a picture file, whole or not at all."""
+    """Draw a distance field to a picture file, completely or not at all."""
     _save(lambda: draw_field(field), Path(path))
 
 

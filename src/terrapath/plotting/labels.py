@@ -12,7 +12,7 @@ LONGEST_IN_METRES = 10_000.0
 
 
 def in_words(text: str) -> str:
-    """A name that came with a map, for matplotlib, to which dollar signs are mathematics."""
+    """A name from a map, for matplotlib, where plain dollar signs would start mathematics."""
     return clean(text).replace("$", r"\$")
 
 
@@ -43,11 +43,11 @@ class AxisUnit(NamedTuple):
         return f"{length / self.size:g}"
 
     def label(self, name: str) -> str:
-        """What the axis is called."""
+        """The axis label."""
         return f"{name} ({self.name})" if self.name else name
 
     def apply(self, axis: Any) -> None:
-        """Have an axis, of map units, number itself in this one."""
+        """Show the numbers of an axis in map units in this unit instead."""
         if self.size != 1.0:
             axis.set_major_formatter(self.format)
 

@@ -43,7 +43,7 @@ def _outline(polygon: Polygon) -> PathPatch:
 
 
 def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain) -> None:
-    """Polygons, discs, walls and blocked cells as given; around them what the radius adds."""
+    """Draw obstacles as given, and around them the margin that the radius adds."""
     constraints = problem.constraints
     _draw_margins(axes, problem, terrain)
     if constraints.outside is not None:
@@ -72,7 +72,7 @@ def _draw_solid(axes: Any, parts: Parts) -> None:
 
 
 def _draw_margins(axes: Any, problem: Problem, terrain: Terrain) -> None:
-    """What lies within the vehicle's radius of an obstacle, all in one tone."""
+    """Draw the ground within the vehicle's radius of an obstacle, in one tone."""
     if problem.radius == 0.0:
         return
     space = problem.free_space

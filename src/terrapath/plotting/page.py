@@ -1,4 +1,4 @@
-"""A page to turn and zoom: terrain and route in 3-D, in one file that needs no network."""
+"""An interactive page: terrain and route in 3-D, in one file that needs no network."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Stage(NamedTuple):
 
 
 def _shown(text: str) -> str:
-    """A name from a file: neither markup nor letters that cannot be written."""
+    """A name from a file, without markup and without characters that cannot be written."""
     return escape(clean(text))
 
 
@@ -122,7 +122,7 @@ def _terrain_traces(stage: Stage) -> list[Any]:
 
 
 def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
-    """Ground that is not free, a little above the other, by the reason; reasons in the legend."""
+    """Ground that is not free, drawn a little higher; the legend shows the reasons."""
     import plotly.graph_objects as go
 
     terrain = stage.terrain
@@ -158,7 +158,7 @@ def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
 
 
 def _outlines(stage: Stage) -> list[Any]:
-    """Edges of polygons, walls and discs as given, laid over the terrain as one broken line."""
+    """Edges of polygons, walls and discs as given, drawn over the terrain as one broken line."""
     import plotly.graph_objects as go
 
     problem = stage.solution.problem
@@ -186,7 +186,7 @@ def _thinned(route: Route) -> Any:
 
 
 def _route_traces(stage: Stage) -> list[Any]:
-    """The route with what the pointer tells of it, and the next best."""
+    """The route, with what the pointer shows of it, and the next best routes."""
     import plotly.graph_objects as go
 
     solution = stage.solution
@@ -199,8 +199,8 @@ def _route_traces(stage: Stage) -> list[Any]:
     )
     height, unit = surface.layers[0], surface.unit
     # Distance, height, slope along, slope of the ground, place.
-    told = np.column_stack([profile.distance, profile.values[:, 0], *slopes(solution.path)])
-    told = np.column_stack([told, profile.points])[kept]
+    shown = np.column_stack([profile.distance, profile.values[:, 0], *slopes(solution.path)])
+    shown = np.column_stack([shown, profile.points])[kept]
     template = (
         f"distance %{{customdata[0]:.6g}}{_suffix(unit)}"
         f"<br>{_shown(height.name)} %{{customdata[1]:.6g}}{_suffix(height.unit)}"
@@ -223,7 +223,7 @@ def _route_traces(stage: Stage) -> list[Any]:
             mode="lines",
             line={"color": PATH_COLOUR, "width": 7},
             name="route",
-            customdata=told,
+            customdata=shown,
             hovertemplate=template,
         )
     )
@@ -266,7 +266,7 @@ def _title(solution: Solution) -> str:
     if solution.lower_bound is None or solution.gap is None:
         return text
     bound = format_length(solution.lower_bound, unit)
-    return f"{text}; {solution.bounded} than {bound}, a gap of {100.0 * solution.gap:.3g} %"
+    return f"{text}; {solution.bound_in_words} than {bound}, a gap of {100.0 * solution.gap:.3g} %"
 
 
 def _axis_title(name: str, unit: str, origin: float) -> dict[str, str]:
@@ -351,7 +351,7 @@ def require_known_page(path: Path) -> None:
 
 
 def plot_page(solution: Solution, path: str | Path) -> None:
-    """Write an interactive 3-D page (.html) that holds all it needs, whole or not at all."""
+    """Write an interactive 3-D page (.html) that needs no other file, completely or not at all."""
     target = Path(path)
     require_known_page(target)
     page = draw_page(solution).to_html(

@@ -75,7 +75,7 @@ def _is_hidden(
 
 
 def _draw_path(axes: Any, solution: Solution, terrain: Terrain, box: Array, spread: Array) -> None:
-    """The path: a strong line where it is in sight, a faint dotted one where it is behind."""
+    """Draw the path: a strong line where it is visible, a faint dotted one where it is hidden."""
     if solution.path is None:
         return
     profile = solution.path.profile
@@ -135,7 +135,7 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
 
 
 def _tint(colours: Array, cells: npt.NDArray[np.bool_], tone: tuple[float, ...]) -> None:
-    """Lay a translucent tone over some of the ground."""
+    """Put a translucent tone over some of the ground."""
     *tint, opacity = tone
     colours[cells] = (1.0 - opacity) * colours[cells] + opacity * np.array(tint)
 

@@ -1,4 +1,4 @@
-"""What a traveller meets along several paths."""
+"""Profiles of several paths in one chart."""
 
 from __future__ import annotations
 

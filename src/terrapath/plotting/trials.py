@@ -14,7 +14,7 @@ BOX_COLOUR = "#9ecae1"
 
 
 def draw_box(axes: Any, lengths: Sequence[float], true_length: float, title: str) -> None:
-    """A box plot of path lengths (map units) with every run beside it."""
+    """A box plot of path lengths (map units), with all runs beside it."""
     values = np.asarray(lengths)
     axes.boxplot(
         values,

@@ -1,4 +1,4 @@
-"""What is asked and what is answered: problem, path, solution; and problems by name."""
+"""Problems, paths and solutions; and built-in problems by name."""
 
 import lazy_loader
 

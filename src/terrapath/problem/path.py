@@ -1,4 +1,4 @@
-"""A path on a surface: its true length, its profile, and what its length is made of."""
+"""A path on a surface: its true length, its profile, and the parts that add up to its length."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ PROFILE_POINTS = 256
 
 
 def _sampled(points: Array, finest: float) -> Array:
-    """A polyline (m, 2) with its pieces cut into equal ones that are no longer than ``finest``.
+    """A polyline (m, 2) whose segments are cut into equal ones, no longer than ``finest``.
 
-    They stay as they are where that is 0.
+    Where ``finest`` is 0 the segments stay as they are.
     """
     moves = np.diff(points, axis=0)
     sizes = np.hypot(*moves.T) / finest if finest > 0.0 else np.ones(len(moves))
     counts = np.maximum(np.ceil(sizes), 1.0).astype(np.intp)
     piece = np.repeat(np.arange(len(moves)), counts)
     place = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
-    # The last place is the piece's end, whatever rounding makes of the share.
+    # The last point is exactly the segment's end, despite rounding.
     shares = np.where(place == counts[piece], 1.0, place * (1.0 / counts)[piece])
     return np.concatenate([points[:1], points[piece] + shares[:, None] * moves[piece]])
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A polyline of the plane, read as a curve on the surface above it.
+    """A polyline on the plane, and the curve on the surface above it.
 
-    points : (m, 2), map units, from start to goal.
+    surface : the surface. points : (m, 2), map units, from start to goal.
     """
 
     surface: Surface
@@ -48,12 +48,12 @@ class Path:
 
     @cached_property
     def line(self) -> shapely.LineString:
-        """The path on the plane."""
+        """The path on the plane, map units."""
         return shapely.LineString(self.points)
 
     @cached_property
     def profile(self) -> Profile:
-        """The path sampled finely enough to see every feature of the surface."""
+        """The surface along the path, sampled finely enough to show every feature of it."""
         finest = min(0.25 * self.surface.resolution, self.line.length / PROFILE_POINTS)
         points = _sampled(self.points, finest)
         steps = metric.segment_lengths(self.surface, points[:-1], points[1:])
@@ -63,12 +63,13 @@ class Path:
 
     @cached_property
     def contributions(self) -> dict[str, float]:
-        """What makes up the length: shares that add up to 1, by the profile.
+        """How much of the length each part makes: shares that add up to 1, by their names.
 
-        A step ds under h without costs is the sum of dx_i^2 / ds over all coordinates of R^n:
-        "plane" is the share of the plane's, and each layer has its own. Costs have what they
-        multiply the length by on top, which is below 0 where that is below 1; several divide it
-        by their logarithms.
+        "plane" is the share of the movement on the plane, and each layer has its own. Without
+        costs, a step ds under h is the sum of dx_i^2 / ds over all coordinates of R^n, one for
+        each share. A cost layer's share is the length that it adds by its factor; it is negative
+        where the factor is below 1. Several cost layers divide what they add by the logarithms
+        of their factors.
         """
         surface, profile = self.surface, self.profile
         steps = np.diff(np.hstack([profile.points, profile.values * surface.data.weights]), axis=0)
@@ -92,15 +93,15 @@ class Path:
 
     @cached_property
     def climb(self) -> float:
-        """Sum of all rises of the first layer along the path, in its unit."""
+        """The sum of all rises of the first layer along the path, in the layer's unit."""
         rises = np.diff(self.profile.values[:, 0])
         return float(rises[rises > 0.0].sum())
 
 
 class Profile(NamedTuple):
-    """What a traveller meets along a path."""
+    """The surface along a path, sampled."""
 
     points: Array  # (m, 2), map units
-    distance: Array  # (m,) length from the start under h, map units
+    distance: Array  # (m,), length under h from the start, map units
     values: Array  # (m, layers), in the layers' units
-    costs: Array  # (m, costs): what the cost layers multiply lengths by, weights left out
+    costs: Array  # (m, costs), the factors of the cost layers, without weights

@@ -1,23 +1,26 @@
-"""What is asked: a surface, free space, a start and a goal."""
+"""A problem: a surface, free space, a start and a goal."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import BlockedError, InputError, OutsideSurfaceError
-from ..space.constraints import Constraints, outside_of
+from ..space.constraints import Area, Constraints, outside_of
 from ..space.free_space import Obstacle
 from ..space.lattice import default_spacing
-from ..space.slope_limit import Steepness
 from ..surface import Surface, metric
 from ..surface.bounds import Bounds, as_bounds
-from ..validation import as_point, require_not_negative
+from ..validation import Point, PointLike, as_point, require_not_negative
 from .path import Path
+
+if TYPE_CHECKING:
+    from ..space.slope_limit import SlopeLimit
 
 
 class Problem:
@@ -25,27 +28,28 @@ class Problem:
 
     surface : Surface. start, goal : (x1, x2), map units, in free space.
     bounds : (x1_min, x2_min, x1_max, x2_max), map units; by default the surface's.
-    obstacles : shapely polygons and lines, ``Circle`` and ``Mask``, map units.
-    The surface's no-data cells are obstacles too.
-    radius : of the vehicle, map units; obstacles of all kinds are inflated by it, so that a path
-    is never nearer to one. Points are obstacles, too, where there is a radius.
-    max_slope : degrees; ground on which the first layer, without its weight, rises more is an
-    obstacle. keep_in : shapely polygon or polygons that the vehicle stays inside of.
-    ``obstacles`` are those given, ``free_space`` is what they leave to the vehicle's centre.
-    Raises OutsideSurfaceError or InputError, naming the value and the remedy.
+    obstacles : shapely polygons and lines, ``Circle`` and ``Mask``, map units. The surface's
+    no-data cells are obstacles too. Points are allowed where there is a radius.
+    radius : of the vehicle, map units. Obstacles of all kinds are inflated by it, so that no path
+    comes nearer to one. max_slope : degrees. Ground is an obstacle where the first layer, without
+    its weight, is steeper. keep_in : shapely polygon or polygons that the vehicle must not leave.
+    name : shown in reports.
+
+    ``obstacles`` are those given; ``free_space`` is where the vehicle's centre may be.
+    Raises OutsideSurfaceError, BlockedError or InputError, naming the value and the remedy.
     """
 
     def __init__(
         self,
         surface: Surface,
-        start: Any,
-        goal: Any,
-        bounds: Any = None,
+        start: PointLike,
+        goal: PointLike,
+        bounds: Sequence[float] | None = None,
         obstacles: Iterable[Obstacle] = (),
         *,
         radius: float = 0.0,
         max_slope: float | None = None,
-        keep_in: Any = None,
+        keep_in: Area | None = None,
         name: str = "",
     ) -> None:
         self.surface = surface
@@ -63,22 +67,34 @@ class Problem:
         self.radius = float(radius)
         self.max_slope = max_slope
         self.keep_in = keep_in
-        # Ground beyond the bounds keeps the vehicle off, too.
-        around = self.bounds.widened(self.radius)
-        self.constraints = Constraints(
-            bounds=self.bounds,
-            obstacles=given,
-            nodata=surface.nodata,
-            steepness=None if max_slope is None else Steepness(surface, max_slope, around),
-            outside=None if keep_in is None else outside_of(keep_in, self.bounds, self.radius),
-            radius=self.radius,
-        )
+        self.constraints = self._constraints()
         self.free_space = self.constraints.free_space()
         self.start = self._check("start", start)
         self.goal = self._check("goal", goal)
 
+    def _constraints(self) -> Constraints:
+        outside = None
+        if self.keep_in is not None:
+            outside = outside_of(self.keep_in, self.bounds, self.radius)
+        return Constraints(
+            bounds=self.bounds,
+            obstacles=self.obstacles,
+            nodata=self.surface.nodata,
+            slope_limit=self._slope_limit(),
+            outside=outside,
+            radius=self.radius,
+        )
+
+    def _slope_limit(self) -> SlopeLimit | None:
+        if self.max_slope is None:
+            return None
+        from ..space.slope_limit import SlopeLimit
+
+        # Steep ground just beyond the bounds also keeps the vehicle away.
+        return SlopeLimit(self.surface, self.max_slope, self.bounds.widened(self.radius))
+
     @staticmethod
-    def _make_bounds(surface: Surface, bounds: Any) -> Bounds:
+    def _make_bounds(surface: Surface, bounds: Sequence[float] | None) -> Bounds:
         if bounds is None:
             if surface.bounds is None:
                 raise InputError(
@@ -94,7 +110,7 @@ class Problem:
             )
         return rectangle
 
-    def _check(self, name: str, value: Any) -> tuple[float, float]:
+    def _check(self, name: str, value: PointLike) -> Point:
         point = as_point(value, name)
         if not self.bounds.contains(np.array(point)):
             shown = f"{name}=({point[0]:.10g}, {point[1]:.10g}) is outside the bounds {self.bounds}"
@@ -105,35 +121,40 @@ class Problem:
         shown = f"{name}=({point[0]:.10g}, {point[1]:.10g})"
         raise BlockedError(f"{shown} is {blocker}; move it to free ground")
 
-    def between(self, start: Any, goal: Any, names: tuple[str, str] = ("start", "goal")) -> Problem:
-        """The same ground with another start and goal, which errors call by ``names``."""
+    def between(
+        self, start: PointLike, goal: PointLike, names: tuple[str, str] = ("start", "goal")
+    ) -> Problem:
+        """The same problem with another start and goal, (x1, x2), map units.
+
+        names : what errors call them. Raises as ``Problem`` does.
+        """
         other = copy.copy(self)
         for known in ("straight_length", "is_unreachable"):
             other.__dict__.pop(known, None)
         other.start, other.goal = self._check(names[0], start), self._check(names[1], goal)
         return other
 
-    def path(self, points: Any) -> Path:
-        """A path of this problem's surface through the given points."""
+    def path(self, points: npt.ArrayLike) -> Path:
+        """The path on this problem's surface through points (m, 2), map units."""
         return Path(self.surface, np.asarray(points, np.float64))
 
     @property
     def default_spacing(self) -> float:
-        """The spacing of nodes, map units, where none is asked for."""
+        """The default spacing of lattice nodes, map units."""
         return default_spacing(self.bounds, self.surface.resolution)
 
     @cached_property
     def straight_length(self) -> float:
-        """Length on the surface of the straight way from start to goal, obstacles or not."""
+        """Length on the surface of the straight line from start to goal, through all obstacles."""
         return metric.curve_length(self.surface, [self.start, self.goal])
 
     @cached_property
     def is_unreachable(self) -> bool:
-        """Is it proven that no path leads from start to goal?"""
+        """Is it proven that no path leads from start to goal? False where that is not known."""
         return self.free_space.separates(self.start, self.goal)
 
     def __repr__(self) -> str:
-        # Also of a problem that is only half made, as debuggers show one whose end is refused.
+        # Debuggers also show a problem that is only half made, where its start or goal is refused.
         known = vars(self)
         name = f"{known['name']}: " if known.get("name") else ""
         start, goal, bounds, surface = (

@@ -1,17 +1,22 @@
-"""What is answered: status, path, bound, and how they were found."""
+"""A solution: status, path, lower bound, and how they were found."""
 
 from __future__ import annotations
 
 import enum
 import math
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ..validation import Array
 from .path import Path
 from .problem import Problem
+
+if TYPE_CHECKING:  # these know solutions, and solutions only carry them
+    from ..certificates.certificate import Certificate
+    from ..planners.corridor import Corridor
 
 
 class Status(enum.Enum):
@@ -24,7 +29,7 @@ class Status(enum.Enum):
 
     @property
     def message(self) -> str:
-        """What it means and what to do about it."""
+        """What the status means, and what to do about it."""
         return _MESSAGES[self]
 
 
@@ -38,23 +43,23 @@ _MESSAGES = {
 
 
 class History(NamedTuple):
-    """How the best cost fell, one entry a chunk of samples."""
+    """How the best cost fell during a search; an entry for each chunk of samples."""
 
-    samples: Array  # (k,)
-    seconds: Array  # (k,)
+    samples: Array  # (k,), drawn so far
+    seconds: Array  # (k,), since the search began
     best_cost: Array  # (k,), map units, infinite before the first path
 
 
 class SearchTree(NamedTuple):
-    """The vertices of a tree planner."""
+    """The vertices of a tree planner, in the order in which they were added."""
 
     points: Array  # (n, 2), map units
-    parents: np.ndarray[Any, np.dtype[np.int32]]  # (n,), -1 at the start
-    costs: Array  # (n,), map units
+    parents: npt.NDArray[np.int32]  # (n,), number of each one's parent, -1 at the start
+    costs: Array  # (n,), cost from the start, map units
 
     @property
     def segments(self) -> Array:
-        """(n - 1, 2, 2): each edge from parent to child."""
+        """(n - 1, 2, 2): each edge, from parent to child, map units."""
         children = np.flatnonzero(self.parents >= 0)
         return np.stack([self.points[self.parents[children]], self.points[children]], axis=1)
 
@@ -63,41 +68,39 @@ class SearchTree(NamedTuple):
 class Solution:
     """What a planner found.
 
-    Lengths are in map units. ``length`` is the true length of the path whatever the
-    planner optimised; ``cost`` is what the planner itself believed. ``path``, ``length``
-    and ``cost`` are None where no path was found, and so is a bound not asked for.
-    ``alternatives`` are further paths that the planner found, shortest first. Where the path
-    was refined, ``unrefined`` is the planner's own. ``certificate`` proves the lower bound.
+    Lengths are in map units. ``path``, ``length`` and ``cost`` are None where no path was found.
+    ``length`` is the true length of the path, whatever the planner minimised; ``cost`` is the
+    planner's own measure of it. ``lower_bound`` is None where none was asked for.
     """
 
-    problem: Problem
-    planner: str
-    status: Status
+    problem: Problem  # as it was asked
+    planner: str  # its name
+    status: Status  # how the planner ended
     path: Path | None
-    cost: float | None
-    seconds: float
-    samples: int = 0
-    seed: int | None = None
-    stopped_by: str = ""
-    lower_bound: float | None = None
-    alternatives: tuple[Path, ...] = ()
-    unrefined: Path | None = None
-    certificate: Any = None
-    history: History | None = None
-    tree: SearchTree | None = None
-    counters: dict[str, int] = field(default_factory=dict)
-    legs: tuple[Solution, ...] = ()  # of a tour, from each waypoint to the next
-    options: dict[str, Any] = field(default_factory=dict)  # of the planner, as it was run
-    corridor: Any = None  # where alone the lower bound holds; None for everywhere
+    cost: float | None  # map units
+    seconds: float  # planning took, with refinement and bound
+    samples: int = 0  # samples drawn, nodes settled or rays traced
+    seed: int | None = None  # None for planners that draw no random numbers
+    stopped_by: str = ""  # what ended the search, in words
+    lower_bound: float | None = None  # on the length of every path, map units
+    alternatives: tuple[Path, ...] = ()  # further paths, shortest first
+    unrefined: Path | None = None  # the planner's own path, where it was refined
+    certificate: Certificate | None = None  # the proof of the lower bound
+    history: History | None = None  # of tree planners
+    tree: SearchTree | None = None  # of tree planners
+    counters: dict[str, int] = field(default_factory=dict)  # of vertices and edges, by name
+    legs: tuple[Solution, ...] = ()  # of a tour, from each stop to the next
+    options: dict[str, Any] = field(default_factory=dict)  # the planner's, as it was run
+    corridor: Corridor | None = None  # the lower bound holds only in it; None for everywhere
 
     @property
     def length(self) -> float | None:
-        """True length of the path under h, to 1e-9 relative."""
+        """True length of the path under h, map units, to 1e-9 relative."""
         return None if self.path is None else self.path.length
 
     @property
     def gap(self) -> float | None:
-        """(length - lower_bound) / lower_bound; infinite where nothing above 0 is proven."""
+        """(length - lower_bound) / lower_bound; infinite where the lower bound is 0."""
         if self.length is None or self.lower_bound is None:
             return None
         if self.length == self.lower_bound:
@@ -108,23 +111,23 @@ class Solution:
 
     @property
     def stops(self) -> Array:
-        """(k, 2): the start and where each leg ends, map units; two points without legs."""
+        """(k, 2): the start and the end of each leg, map units; start and goal without legs."""
         ends = [leg.problem.goal for leg in self.legs or (self,)]
         return np.array([self.problem.start, *ends])
 
     @property
     def straight_length(self) -> float:
-        """Length on the surface of the straight ways from stop to stop, obstacles or not."""
+        """Length on the surface of the straight lines from stop to stop, through all obstacles."""
         return sum(leg.problem.straight_length for leg in self.legs or (self,))
 
     @property
     def via(self) -> Array:
-        """(k, 2): stops of the route between start and goal, map units; none without a route."""
+        """(k, 2): the stops between start and goal, map units; none where there is no path."""
         return self.stops[1:-1] if self.path is not None else np.empty((0, 2))
 
     @property
-    def bounded(self) -> str:
-        """What the lower bound speaks of, in words: "no path is shorter"."""
+    def bound_in_words(self) -> str:
+        """What the lower bound says, in words, such as "no path is shorter"."""
         which = " through these points" if self.legs else ""
         where = "" if self.corridor is None else " in the corridor"
         return f"no path{which}{where} is shorter"

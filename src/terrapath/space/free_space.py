@@ -1,9 +1,9 @@
-"""Free space: bounds minus obstacles and no-data."""
+"""Free space: bounds minus obstacles, no-data and too steep ground."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
@@ -16,21 +16,23 @@ from .._kernels.space import free_space as kernels
 from ..errors import InputError
 from ..surface import Mask
 from ..surface.bounds import Bounds
-from ..validation import Array, as_array, as_point, require_positive
+from ..validation import Array, Point, as_array, as_point, require_positive
 from .lattice import Lattice
-from .reachability import separated
 
-# Around two edges or circles a cell keeps the lists short and the index small.
+# About two edges or circles in each cell of the index keep its lists short and itself small.
 ITEMS_PER_CELL = 2.0
 MOST_CELLS_A_SIDE = 1024
 
-# Corners of the polygon inside a disc that stands for it where separation is to be proven.
+# In proofs of separation a disc is replaced by a polygon inside it, with this many corners.
 CORNERS_OF_DISC = 64
 
 
 @dataclass(frozen=True)
 class Circle:
-    """A closed disc that may not be entered, map units."""
+    """A closed disc that may not be entered: centre (x1, x2) and radius, map units.
+
+    Raises InputError for a radius that is not above 0, or a number that is not finite.
+    """
 
     x1: float
     x2: float
@@ -43,8 +45,8 @@ class Circle:
 
     @property
     def inscribed(self) -> shapely.Polygon:
-        """A polygon that lies wholly in the disc, rounding allowed for."""
-        # Turned, so that corners of equal discs are not within rounding of one another's sides.
+        """A polygon that lies wholly inside the disc, despite rounding."""
+        # It is turned a little, so that the corners of equal discs do not nearly touch their sides.
         angles = 0.1 + np.linspace(0.0, 2.0 * math.pi, CORNERS_OF_DISC, endpoint=False)
         ring = np.column_stack([np.cos(angles), np.sin(angles)])
         return shapely.Polygon((self.x1, self.x2) + self.radius * (1.0 - 1e-9) * ring)
@@ -60,44 +62,52 @@ POINTS = (0, 4)  # shapely's type ids
 POLYGON = 3
 
 
+def are_points(geometries: Geometries) -> npt.NDArray[np.bool_]:
+    """(m,), which geometries are points, or several of them."""
+    return np.isin(shapely.get_type_id(geometries), POINTS)
+
+
 class Parts(NamedTuple):
-    """Obstacles sorted by what they are; geometries are split into points, lines and polygons."""
+    """Obstacles by kind; geometries are split into points, lines and polygons."""
 
     geometries: Geometries  # (m,)
     owners: Indices  # (m,): the obstacle that each belongs to
-    circles: list[Circle]
-    masks: list[Mask]
+    circles: list[Circle]  # in their order
+    masks: list[Mask]  # in their order
 
 
 def sort_obstacles(obstacles: Iterable[Obstacle]) -> Parts:
-    """Obstacles taken apart and checked. Raises InputError with the place of one that is none."""
-    geometries, places = [], []
-    circles, masks = [], []
-    for index, obstacle in enumerate(obstacles):
-        if isinstance(obstacle, Circle):
-            circles.append(obstacle)
-        elif isinstance(obstacle, Mask):
-            masks.append(obstacle)
-        elif isinstance(obstacle, BaseGeometry):
-            geometries.append(obstacle)
-            places.append(index)
-        else:
+    """Obstacles by kind, checked. Raises InputError with the index of one that is none."""
+    given = list(obstacles)
+    for index, obstacle in enumerate(given):
+        if not isinstance(obstacle, BaseGeometry | Circle | Mask):
             raise InputError(
                 f"obstacles[{index}] is a {type(obstacle).__name__}; "
                 "give shapely geometries, Circle or Mask"
             )
-    whole, owners = np.array(geometries, np.object_), np.array(places, np.int64)
-    invalid = ~shapely.is_valid(whole)
+    places = [k for k, obstacle in enumerate(given) if isinstance(obstacle, BaseGeometry)]
+    owners = np.array(places, np.int64)
+    geometries = np.array([given[k] for k in places], np.object_)
+    _refuse_invalid(geometries, owners)
+    circles = [obstacle for obstacle in given if isinstance(obstacle, Circle)]
+    masks = [obstacle for obstacle in given if isinstance(obstacle, Mask)]
+    return Parts(*simple_parts(geometries, owners), circles, masks)
+
+
+def _refuse_invalid(geometries: Geometries, owners: Indices) -> None:
+    invalid = ~shapely.is_valid(geometries)
     if invalid.any():
         raise InputError(
             f"obstacles[{owners[invalid][0]}] is not valid: "
-            f"{shapely.is_valid_reason(whole[invalid][0])}; repair it with shapely.make_valid"
+            f"{shapely.is_valid_reason(geometries[invalid][0])}; repair it with shapely.make_valid"
         )
-    return Parts(*simple_parts(whole, owners), circles, masks)
 
 
 def simple_parts(geometries: Geometries, owners: Indices) -> tuple[Geometries, Indices]:
-    """Points, lines and polygons of geometries, however deep they are nested, none empty."""
+    """The points, lines and polygons that geometries are made of, however nested; none is empty.
+
+    owners (m,) : the obstacle that each geometry belongs to. Returns the parts and their owners.
+    """
     while (shapely.get_type_id(geometries) > POLYGON).any():
         geometries, which = shapely.get_parts(geometries, return_index=True)
         owners = owners[which]
@@ -106,7 +116,7 @@ def simple_parts(geometries: Geometries, owners: Indices) -> tuple[Geometries, I
 
 
 def _refuse_points(parts: Parts) -> None:
-    without_width = np.isin(shapely.get_type_id(parts.geometries), POINTS)
+    without_width = are_points(parts.geometries)
     if without_width.any():
         raise InputError(
             f"obstacles[{parts.owners[without_width][0]}] holds a Point, which has no width to "
@@ -115,7 +125,10 @@ def _refuse_points(parts: Parts) -> None:
 
 
 def outlines(geometries: Geometries) -> tuple[Geometries, Indices]:
-    """The rings of polygons, and other parts themselves, in their order; whose each of them is."""
+    """The rings of polygons, and other parts as they are, in their order.
+
+    Returns them, and for each the index of the geometry that it belongs to.
+    """
     rings, owners = shapely.get_rings(geometries, return_index=True)
     is_other = shapely.get_type_id(geometries) != POLYGON
     owners = np.concatenate([owners, np.flatnonzero(is_other)])
@@ -124,23 +137,28 @@ def outlines(geometries: Geometries) -> tuple[Geometries, Indices]:
 
 
 def _edges(geometries: Geometries) -> Array:
-    """Boundary edges (m, 4) of polygons with their holes, and of lines."""
+    """Edges (m, 4) of polygons, holes included, and of lines: x1 and x2 of both ends."""
     corners, line = shapely.get_coordinates(outlines(geometries)[0], return_index=True)
     edges = np.hstack([corners[:-1], corners[1:]])
     return np.asarray(edges[line[1:] == line[:-1]].reshape(-1, 4))
 
 
 def index_grid(bounds: Bounds, items: int) -> kernels.Grid:
-    """Cells over the bounds, for so many items to be listed in."""
+    """The cells over the bounds in which ``items`` edges or circles are listed."""
     side = max(1, min(int(math.sqrt(items / ITEMS_PER_CELL)), MOST_CELLS_A_SIDE))
     step = (bounds.width / side, bounds.height / side)
     return kernels.Grid(bounds.x1_min, bounds.x2_min, *step, side, side)
 
 
-def listed(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indices]:
-    """Which items each cell of the grid holds: (first, ids) as in ``Space``."""
+def listed(
+    lister: Callable[..., None], grid: kernels.Grid, items: Array
+) -> tuple[Indices, Indices]:
+    """The items of each cell of the grid: (first, ids) as in ``Space``.
+
+    lister : the kernel that counts and lists items of their kind.
+    """
     counts = np.zeros(grid.nx * grid.ny + 1, np.int64)
-    if len(items) == 0:  # the kernel need not even be compiled
+    if len(items) == 0:  # saves compiling the kernel
         return counts, np.empty(0, np.int64)
     lister(grid, items, counts, np.empty(0, np.int64))
     first = np.cumsum(counts)
@@ -152,8 +170,9 @@ def listed(lister: Any, grid: kernels.Grid, items: Array) -> tuple[Indices, Indi
 class FreeSpace:
     """Where a path may go: inside the bounds, touching no obstacle.
 
-    obstacles : shapely polygons (with holes) and lines, ``Circle`` and ``Mask``. All are
-    closed sets: a path may not even touch them, so ``shapely`` finds it disjoint from them.
+    obstacles : shapely polygons (with holes) and lines, ``Circle`` and ``Mask``. All are closed
+    sets, so a path may not even touch them. ``shapely`` finds each path disjoint from them.
+    Raises InputError for an obstacle that is none of these, or not valid.
     """
 
     def __init__(self, bounds: Bounds, obstacles: Iterable[Obstacle] = ()) -> None:
@@ -192,14 +211,14 @@ class FreeSpace:
         """Is there anything to avoid within the bounds?"""
         return bool(self.geometries or self.circles or self.masks)
 
-    def blocker(self, point: tuple[float, float]) -> str | None:
-        """What makes a point not free, in words; None where it is free."""
+    def blocker(self, point: Point) -> str | None:
+        """Why a point (x1, x2) is not free, in words; None where it is free."""
         if not self.bounds.contains(np.array(point)):
             return f"outside the bounds {self.bounds}"
         return self._obstacle_at(point) if self.has_obstacles else None
 
-    def _obstacle_at(self, point: tuple[float, float]) -> str | None:
-        """What obstacle makes a point not free, in words."""
+    def _obstacle_at(self, point: Point) -> str | None:
+        """Which obstacle holds a point, in words; None where none does."""
         masks = range(len(self.masks))
         if any(kernels.mask_is_hit(self.data, mask, *point, *point) for mask in masks):
             return "in a blocked or no-data cell"
@@ -208,15 +227,16 @@ class FreeSpace:
         discs = ((circle.x1, circle.x2, circle.radius) for circle in self.circles)
         if any(kernels.may_enter_circle(*point, *point, *disc) for disc in discs):
             return "inside a circular obstacle"
-        # The kernel's own answer: a point that it takes for a touch could never be left.
+        # The kernel decides: no edge could lead away from a point that it finds blocked.
         if not kernels.segment_is_free(self.data, *point, *point):
             return "on the edge of an obstacle"
         return None
 
-    def segments_are_free(self, a: Any, b: Any) -> npt.NDArray[np.bool_]:
-        """Do the closed segments a-b, each (m, 2), touch nothing? One end must be free.
+    def segments_are_free(self, a: npt.ArrayLike, b: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """(m,), which closed segments a-b touch no obstacle.
 
-        In doubt, within rounding of a touch, the answer is no.
+        a, b : (m, 2), map units; of each segment one end must be free. In doubt, within rounding
+        of a touch, a segment is not free. Raises InputError where their numbers differ.
         """
         start, end = as_array(a, "a", shape=(None, 2)), as_array(b, "b", shape=(None, 2))
         if len(start) != len(end):
@@ -228,7 +248,7 @@ class FreeSpace:
         return free.astype(bool)
 
     def covered_cells(self, lattice: Lattice) -> npt.NDArray[np.bool_]:
-        """Cells (ny - 1, nx - 1) of a lattice that lie wholly inside one obstacle. In doubt, no."""
+        """(ny - 1, nx - 1), which cells of a lattice surely lie wholly inside one obstacle."""
         covered = np.zeros((lattice.ny - 1, lattice.nx - 1), bool)
         for mask in self.masks:
             covered |= _covered_by_mask(mask, lattice)
@@ -239,23 +259,27 @@ class FreeSpace:
             covered[window] |= inside
         return covered
 
-    def separates(self, a: tuple[float, float], b: tuple[float, float]) -> bool:
+    def separates(self, a: Point, b: Point) -> bool:
         """Is it proven that no path in free space leads from a to b?
 
-        a, b : (x1, x2), map units, in free space. False where a path exists, and where none may
-        but floating point leaves a doubt: a gap or a touch within rounding.
-        Raises InputError where a or b is not free.
+        a, b : (x1, x2), map units, in free space. False where a path exists. False also where
+        rounding leaves a doubt: at a gap or a touch within rounding, or where a proof would
+        take too long. Raises InputError where a or b is not free.
         """
         for name, point in (("a", as_point(a, "a")), ("b", as_point(b, "b"))):
             if blocker := self.blocker(point):
                 raise InputError(f"{name}=({point[0]:.10g}, {point[1]:.10g}) is {blocker}")
+        if not self.has_obstacles:
+            return False
+        from .reachability import separated
+
         discs = np.array([circle.inscribed for circle in self.circles], np.object_)
         walls, _ = outlines(np.concatenate([self._geometries, discs]))
         return separated(self.bounds, self.data, self.masks, walls, a, b)
 
 
 def _may_cover(geometries: Geometries, lattice: Lattice) -> npt.NDArray[np.bool_]:
-    """Which are polygons that are large enough to cover a cell?"""
+    """(m,), which geometries are polygons that are large enough to cover a cell."""
     west, south, east, north = shapely.bounds(geometries).reshape(-1, 4).T
     slack = 1.0 - 1e-9
     is_large = (east - west >= slack * lattice.dx) & (north - south >= slack * lattice.dy)
@@ -290,8 +314,10 @@ def _covered_by_mask(mask: Mask, lattice: Lattice) -> npt.NDArray[np.bool_]:
     return np.asarray((blocked == (j1 - j0) * (i1 - i0)) & in_rows & in_columns)
 
 
-def _mask_spans(nodes: Array, origin: float, step: float, count: int) -> tuple[Any, Any, Any]:
-    """First and one past the last mask cell that each cell of an axis touches; is it within?"""
+def _mask_spans(
+    nodes: Array, origin: float, step: float, count: int
+) -> tuple[Indices, Indices, npt.NDArray[np.bool_]]:
+    """For each cell of an axis: the first mask cell it touches, one past the last, is it within?"""
     first = np.floor((nodes[:-1] - origin) / step - 1e-9).astype(np.int64)
     last = np.ceil((nodes[1:] - origin) / step + 1e-9).astype(np.int64)
     return np.clip(first, 0, count), np.clip(last, 0, count), (first >= 0) & (last <= count)
@@ -310,8 +336,8 @@ def _cells_near(
     return np.ix_(j, i), low, high
 
 
-def _stack_masks(masks: Sequence[Mask]) -> tuple[Array, Any, Any]:
-    """Masks behind one another, as ``Space`` holds them."""
+def _stack_masks(masks: Sequence[Mask]) -> tuple[Array, Indices, npt.NDArray[np.uint8]]:
+    """Masks one after another: frames, shapes and cells, as in ``Space``."""
     frames, shapes, cells, offset = [], [], [], 0
     for mask in masks:
         dx, dy = mask.spacing

@@ -1,4 +1,4 @@
-"""A rectangular lattice of nodes over a region: where grid planners put their vertices."""
+"""A rectangular lattice of nodes over a region; the vertices of grid planners."""
 
 from __future__ import annotations
 
@@ -13,23 +13,29 @@ from ..errors import InputError
 from ..surface.bounds import Bounds
 from ..validation import Array, require_positive
 
-# The default spacing of the nodes is this share of the region's longer side, or less where the
-# surface has finer features, but never less than the other one.
+# By default the region's longer side has this many nodes. Where the surface has finer features it
+# has more, up to the second number.
 NODES_PER_SIDE, MOST_NODES_PER_SIDE = 250.0, 1000.0
 
-# Nodes that can be numbered by 32 bits, and fit in the memory of a large machine.
+# This many nodes can be numbered in 32 bits, and fit in the memory of a large machine.
 MOST_NODES = 2**30
 
 
 def default_spacing(bounds: Bounds, resolution: float) -> float:
-    """A spacing of nodes that suits a region with features of a resolution, map units."""
+    """The default spacing of nodes, map units.
+
+    resolution : the size of the surface's finest features, map units.
+    """
     side = max(bounds.width, bounds.height)
     return max(min(side / NODES_PER_SIDE, resolution), side / MOST_NODES_PER_SIDE)
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """nx times ny nodes, the outermost on the edge of the bounds."""
+    """nx times ny nodes; the outermost lie on the edge of the bounds.
+
+    bounds : map units. nx, ny : number of nodes along x1 and x2, at least 2.
+    """
 
     bounds: Bounds
     nx: int
@@ -67,12 +73,12 @@ class Lattice:
 
     @cached_property
     def x(self) -> Array:
-        """(nx,), map units."""
+        """(nx,), x1 of the columns, map units."""
         return np.linspace(self.bounds.x1_min, self.bounds.x1_max, self.nx)
 
     @cached_property
     def y(self) -> Array:
-        """(ny,), map units."""
+        """(ny,), x2 of the rows, map units."""
         return np.linspace(self.bounds.x2_min, self.bounds.x2_max, self.ny)
 
     @property
@@ -82,5 +88,5 @@ class Lattice:
 
     @property
     def data(self) -> Grid:
-        """As kernels read it: node (i, j) lies at (x0 + i dx, y0 + j dy)."""
+        """The lattice for kernels: node (i, j) lies at (x0 + i dx, y0 + j dy)."""
         return Grid(self.bounds.x1_min, self.bounds.x2_min, self.dx, self.dy, self.nx, self.ny)

@@ -1,7 +1,7 @@
 """Proof that no path exists: two points in different parts of the free space.
 
-Every answer errs on one side. "Separated" is said only where it holds whatever rounding does
-to the last digits; where that is in doubt, or would take too long to find out, it is not said.
+Errors are on one side only. Points are called separated only where that holds despite all
+rounding. Where there is a doubt, or a proof would take too long, they are not.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -18,25 +18,25 @@ import shapely
 from .._kernels.space import free_space as kernels
 from ..surface import Mask
 from ..surface.bounds import Bounds
-from ..validation import Array
+from ..validation import Array, Point
 from .lattice import Lattice
 
-Point: TypeAlias = tuple[float, float]
 Cells: TypeAlias = npt.NDArray[np.bool_]
+Indices: TypeAlias = npt.NDArray[np.intp]
 Lines: TypeAlias = npt.NDArray[np.object_]  # (m,) shapely.LineString
 
-# A strip of cells inside the bounds that is thinner than this share of a cell is left out. That
-# opens nothing: kernels take all that is within 1e-7 of a blocked cell for blocked.
+# A strip of cells inside the bounds that is thinner than this share of a cell is left out. No path
+# fits there: for kernels, all ground within 1e-7 of a blocked cell is blocked.
 SLIVER = 1e-9
 
-# Walls that come nearer than this share of the largest coordinate, and do not touch, are in
-# doubt. It is over a hundred times what rounding moves the points where walls cross.
+# Walls that do not touch, but come nearer than this share of the largest coordinate, leave a doubt.
+# Rounding moves the points where walls cross by less than a hundredth of that.
 DOUBT = 2.0**-45
 
-# Where walls have more corners than this nothing is proven: it would take seconds.
+# Where walls have more corners than this, no proof is tried: it would take seconds.
 MOST_CORNERS = 30_000
 
-# Nodes along each side of the lattice on which a path is looked for before a proof is.
+# Before a proof is tried, a path is looked for on a lattice with this many nodes a side.
 WITNESS_NODES = 65
 
 
@@ -45,7 +45,7 @@ def separated(
 ) -> bool:
     """Is it proven that no path inside the bounds leads from a to b, two free points?
 
-    space : all obstacles, for segments to be tested against. masks : theirs. walls : lines,
+    space : all obstacles, to test segments against. masks : the masks among them. walls : lines,
     each of which lies wholly in one of the other obstacles.
     """
     if _are_free(space, np.array([a]), np.array([b])).all():
@@ -68,7 +68,7 @@ def separated(
 
 
 def merged_masks(masks: Iterable[Mask]) -> list[Mask]:
-    """Masks with those on the same grid made one."""
+    """Masks, with those on the same grid merged into one."""
     merged: dict[tuple[bytes, bytes], Mask] = {}
     for mask in masks:
         grid = (mask.x.tobytes(), mask.y.tobytes())
@@ -79,7 +79,7 @@ def merged_masks(masks: Iterable[Mask]) -> list[Mask]:
 
 @dataclass(frozen=True)
 class _Axis:
-    """The cells of one axis of a mask that the bounds hold; -1 and n stand for all beyond."""
+    """The cells of one axis of a mask within the bounds; -1 and n are all cells beyond the mask."""
 
     origin: float  # lower border of cell 0
     size: float  # of a cell, map units
@@ -96,12 +96,12 @@ class _Axis:
         return cls(origin, size, first, last, low, high)
 
     def cell(self, x: float) -> int:
-        """The place among the cells held of the one that x lies in."""
+        """The index, counted from ``first``, of the cell that x lies in."""
         index = math.floor((x - self.origin) / self.size)
         return min(max(index, self.first), self.last) - self.first
 
     def borders(self) -> Array:
-        """Between and around the cells held; on the edge of the bounds where within rounding."""
+        """The borders of the cells; those within rounding of the bounds are put onto them."""
         lines = self.origin + self.size * np.arange(self.first, self.last + 2, dtype=np.float64)
         for edge in (self.low, self.high):
             lines[np.abs(lines - edge) <= SLIVER * self.size] = edge
@@ -110,7 +110,7 @@ class _Axis:
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """The part of a mask that the bounds hold; around its grid nothing is blocked."""
+    """The part of a mask within the bounds; beyond the mask nothing is blocked."""
 
     blocked: Cells
     x: _Axis
@@ -127,7 +127,7 @@ class _Window:
     def separates(self, a: Point, b: Point) -> bool:
         """Do blocked cells alone separate a from b?
 
-        They are closed, so free cells are joined by their sides alone.
+        Blocked cells are closed, so a path leads from one free cell to another only through a side.
         """
         if not self.blocked.any():
             return False
@@ -135,11 +135,11 @@ class _Window:
 
         parts, _ = ndimage.label(~self.blocked)
         part_of_a, part_of_b = (parts[self.y.cell(y), self.x.cell(x)] for x, y in (a, b))
-        # A free point lies in no blocked cell, 0, unless rounding says so.
+        # A free point lies in a blocked cell, whose part is 0, only by rounding.
         return bool(part_of_a != part_of_b and part_of_a > 0 and part_of_b > 0)
 
     def outline(self) -> Array:
-        """(m, 2, 2): the borders between blocked and free cells, straight runs in one piece."""
+        """(m, 2, 2): the borders between blocked and free cells, each straight run one segment."""
         x, y = self.x.borders(), self.y.borders()
         row, first, last = _runs(self.blocked)
         along_x = np.column_stack([x[first], y[row], x[last], y[row]])
@@ -148,7 +148,7 @@ class _Window:
         return np.concatenate([along_x, along_y]).reshape(-1, 2, 2)
 
 
-def _runs(blocked: Cells) -> tuple[Any, Any, Any]:
+def _runs(blocked: Cells) -> tuple[Indices, Indices, Indices]:
     """Straight borders between rows: which border, and the first and last corner of each run."""
     rows = np.pad(blocked, ((1, 1), (0, 0)))
     border = np.pad(rows[1:] != rows[:-1], ((0, 0), (1, 1)))
@@ -164,7 +164,7 @@ def _joined_on_lattice(bounds: Bounds, space: kernels.Space, a: Point, b: Point)
     """Is there a free path from a to b along the lines of a coarse lattice?"""
     lattice = Lattice(bounds, WITNESS_NODES, WITNESS_NODES)
     nodes = lattice.points
-    # Every other row and column of the picture holds the nodes, those between them the edges.
+    # In the picture every other row and column holds nodes; those between hold the edges.
     picture = np.zeros((2 * lattice.ny - 1, 2 * lattice.nx - 1), np.bool_)
     picture[::2, ::2] = True
     picture[::2, 1::2] = _are_free(space, nodes[:, :-1], nodes[:, 1:])
@@ -182,7 +182,7 @@ def _joined_on_lattice(bounds: Bounds, space: kernels.Space, a: Point, b: Point)
     return bool(np.isin(*reached).any())
 
 
-def _are_free(space: kernels.Space, a: Any, b: Any) -> Cells:
+def _are_free(space: kernels.Space, a: Array, b: Array) -> Cells:
     """Segments a-b, each (..., 2) -> (...) bool."""
     free = np.empty(a.shape[:-1], np.uint8)
     flat = (np.ascontiguousarray(ends).reshape(-1, 2) for ends in (a, b))
@@ -196,10 +196,10 @@ def _are_free(space: kernels.Space, a: Any, b: Any) -> Cells:
 def _walls_separate(bounds: Bounds, walls: Lines, a: Point, b: Point) -> bool:
     """Do the walls, together with the edge of the bounds, separate a from b?
 
-    They cut the bounds into faces; points in different faces are separated by a ring of walls.
-    Rounding moves the points where walls cross, though, and so might close a gap between walls
-    that do not touch. Where a gap along the ring is that narrow, or a or b that near to a wall,
-    there is no proof.
+    Walls cut the bounds into faces, and a ring of walls separates points in different faces. But
+    rounding moves the points where walls cross, so it might close a gap between walls that do not
+    touch. Where a gap along the ring is that narrow, or a or b is that near to a wall, there is
+    no proof.
     """
     walls = shapely.remove_repeated_points(walls[shapely.intersects(walls, shapely.box(*bounds))])
     if len(walls) == 0:
@@ -207,14 +207,14 @@ def _walls_separate(bounds: Bounds, walls: Lines, a: Point, b: Point) -> bool:
     narrow = DOUBT * np.abs([*shapely.total_bounds(walls), *bounds]).max()
     if shapely.dwithin(walls, shapely.points([[a], [b]]), 16.0 * narrow).any():
         return False
-    # A free point on the edge of the bounds is moved inside: there is nothing between.
+    # A free point on the edge of the bounds is moved inside. No wall is in between.
     low, high = np.array(bounds[:2]) + 4.0 * narrow, np.array(bounds[2:]) - 4.0 * narrow
     walls = np.append(walls, shapely.box(*bounds).exterior)
     ring = _ring_between(walls, np.clip(a, low, high), np.clip(b, low, high))
     return ring is not None and not _any_narrow_gap(walls, ring, narrow)
 
 
-def _ring_between(walls: Lines, a: Array, b: Array) -> Any:
+def _ring_between(walls: Lines, a: Array, b: Array) -> shapely.LinearRing | None:
     """The ring on the border of a's face that has b on its other side; None if there is none."""
     try:
         faces = shapely.polygonize([shapely.node(shapely.multilinestrings(walls))])
@@ -231,8 +231,8 @@ def _ring_between(walls: Lines, a: Array, b: Array) -> Any:
     return around_b[0] if around_b else None
 
 
-def _any_narrow_gap(walls: Lines, ring: Any, narrow: float) -> bool:
-    """Do two pieces of wall along the ring come so near to one another without a touch?"""
+def _any_narrow_gap(walls: Lines, ring: shapely.LinearRing, narrow: float) -> bool:
+    """Do two pieces of wall along the ring come nearer than ``narrow`` without touching?"""
     corners, wall = shapely.get_coordinates(walls, return_index=True)
     pieces = shapely.linestrings(np.stack([corners[:-1], corners[1:]], axis=1))
     pieces = pieces[wall[1:] == wall[:-1]]

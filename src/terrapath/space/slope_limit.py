@@ -1,4 +1,4 @@
-"""Ground that is steeper than a vehicle can climb, as cells that it may not enter."""
+"""Ground that is too steep for a vehicle, as cells that it may not enter."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -17,26 +16,29 @@ from ..surface.bounds import Bounds
 from ..surface.georeference import metres_of
 from ..validation import Array
 
-# A cell is looked at in four by four steps: at five places along each side.
+# A cell's slope is measured at 5 x 5 points, four steps along each side.
 STEPS = 4
-# Samples handled at once: what fits into a processor's cache.
+# This many samples are computed at once; they fit into a processor's cache.
 SAMPLES_AT_ONCE = 2**16
-# The cells of exact peaks are this share of their finest feature.
+# Exact peaks are cut into cells, this many along their finest feature.
 CELLS_PER_FEATURE = 4.0
 MOST_CELLS = 2**26
-# Cells around a point that may be why its own is blocked.
+# A cell may be blocked because of steep ground up to this many cells away.
 REACH = 2
 
 
 @dataclass(frozen=True, eq=False)
-class Steepness:
-    """The cells of a surface on which its height rises by more than ``max_slope`` degrees.
+class SlopeLimit:
+    """The cells of a surface that are steeper than a vehicle can climb.
 
-    The surface's cells are those around the knots of its spline, which for a map are the map's
-    own; exact peaks are cut into cells finer than any of them.
-    A cell's slope is the largest of the surface's own at 5 x 5 places of the cell and, on a
-    spline, of Horn's estimate from the eight neighbours and the differences of those along
-    each axis.
+    surface : its first layer is the height. max_slope : degrees, above 0 and at most 90.
+    bounds : where exact peaks are cut into cells.
+
+    On a spline there is a cell around each knot; for a map these are the map's own cells. Exact
+    peaks are cut into cells that are finer than any peak. A cell's slope is the largest of the
+    surface's slope at 5 x 5 points of the cell and, on a spline, of Horn's estimate from the
+    eight neighbours and of the differences between neighbours along each axis.
+    Raises InputError for a slope out of range, and for units that cannot be compared.
     """
 
     surface: Surface
@@ -49,19 +51,19 @@ class Steepness:
             raise InputError(f"max_slope={value!r} must be a number of degrees")
         if not 0.0 < value <= 90.0:
             raise InputError(f"max_slope={value:g} must be above 0 and at most 90 degrees")
-        self._scale  # noqa: B018 -- units that cannot be compared are refused at once
+        self._scale  # noqa: B018 -- raises InputError for units that cannot be compared
 
     @cached_property
     def _scale(self) -> float:
-        """Units of the plane in one of height."""
+        """How many units of the plane are one unit of height."""
         plane, height = self.surface.unit, self.surface.layers[0].unit
         if plane == height or not plane or not height:
             return 1.0
         theirs, ours = metres_of(height), metres_of(plane)
         if theirs is None or ours is None:
             raise InputError(
-                f"max_slope={self.max_slope:g} cannot be told for heights in {height!r} on a "
-                f"plane in {plane!r}; give both in metres"
+                f"max_slope={self.max_slope:g} cannot be compared with heights in {height!r} on "
+                f"a plane in {plane!r}; give both in metres"
             )
         return theirs / ours
 
@@ -78,7 +80,7 @@ class Steepness:
         nodata = self.surface.nodata
         georeference = self.surface.georeference
         if georeference is not None and not georeference.is_map_crs:
-            # The map's own cells lie across these.
+            # The map's own cells are turned against these.
             from scipy import ndimage
 
             steep = ndimage.binary_dilation(steep, np.ones((3, 3), np.bool_))
@@ -89,14 +91,14 @@ class Steepness:
 
     @property
     def _limit(self) -> float:
-        """The largest square of a slope that is allowed, rounding forgiven."""
+        """The largest square of a slope that is allowed, with a margin for rounding."""
         if self.max_slope == 90.0:
             return math.inf
         return (math.tan(math.radians(self.max_slope)) / self._scale) ** 2 * (1.0 + 1e-12)
 
     @cached_property
     def _axes(self) -> tuple[Array, Array] | None:
-        """Centres of the cells along both axes; None for a plane without any feature."""
+        """Centres of the cells along both axes; None for a surface that is flat everywhere."""
         data = self.surface.data
         if isinstance(data, Spline):
             rows, columns = data.coefficients.shape[1] - 2, data.coefficients.shape[2] - 2
@@ -126,7 +128,7 @@ class Steepness:
         return _SampledRows(self.surface, *self._axes)
 
     def _blocks(self) -> Iterator[tuple[int, int]]:
-        """First row and one past the last of what is handled at once."""
+        """First row, and one past the last, of each block that is computed at once."""
         assert self._axes is not None
         x, y = self._axes
         samples = len(x) * (1 if isinstance(self.surface.data, Spline) else STEPS**2)
@@ -135,7 +137,7 @@ class Steepness:
             yield first, min(first + rows, len(y))
 
     def describe(self, point: tuple[float, float]) -> str:
-        """In words, how steep the ground is at a point that the mask holds."""
+        """How steep the ground is at a point in a blocked cell, in words."""
         assert self._axes is not None
         x, y = self._axes
         i = min(max(round((point[0] - x[0]) / (x[1] - x[0])), 0), len(x) - 1)
@@ -174,7 +176,7 @@ class _SampledRows:
         return np.asarray(_largest_of_five(along))
 
     def _places(self, centres: Array) -> Array:
-        """The places looked at along an axis, (4 n + 1,): neighbouring cells share an edge."""
+        """(4 n + 1,), the sample points along an axis; neighbouring cells share an edge."""
         step = float(self.x[1] - self.x[0] if centres is self.x else self.y[1] - self.y[0])
         count = STEPS * len(centres) + 1
         return np.asarray(centres[0] - 0.5 * step + step / STEPS * np.arange(count))
@@ -190,7 +192,7 @@ def _largest_of_five(samples: Array) -> Array:
 
 
 def _basis(u: float) -> tuple[Array, Array]:
-    """The cubic B-splines that are alive at u in [0, 1), and their slopes, a knot's spacing 1."""
+    """The cubic B-splines that are not 0 at u in [0, 1), and their slopes; knots are 1 apart."""
     r = 1.0 - u
     values = [r**3, 4.0 - 6.0 * u**2 + 3.0 * u**3, 4.0 - 6.0 * r**2 + 3.0 * r**3, u**3]
     slopes = [-0.5 * r**2, u * (1.5 * u - 2.0), r * (2.0 - 1.5 * r), 0.5 * u**2]
@@ -223,22 +225,23 @@ class _SplineRows:
     def _of_surface(self, first: int, last: int) -> Array:
         """The surface's own slope, at five by five places of each cell."""
         rows, skipped = self._rows(first, last)
-        found: Any = None
+        found: Array | None = None
         for step in range(STEPS):
             values, slopes = _basis(step / STEPS)
             level = _filtered(rows.T, values).T
             rising = _filtered(rows.T, slopes).T / self.dx
             found = _gathered(found, self._largest_along_y(rising, level).T, step)
+        assert found is not None
         return np.asarray(found.T[skipped : skipped + last - first])
 
     def _rows(self, first: int, last: int) -> tuple[Array, int]:
-        """Coefficients around the cells, a knot before and after them; is there one before?"""
+        """Coefficients around the cells, with a row before and after; how many rows are before."""
         before = max(first - 1, 0)
         return self.coefficients[before : last + 3], first - before
 
     def _largest_along_y(self, rising: Array, level: Array) -> Array:
         """(n, m), the largest square of each knot's cell; what comes in is filtered along x."""
-        found: Any = None
+        found: Array | None = None
         for step in range(STEPS):
             values, slopes = _basis(step / STEPS)
             squares = _filtered(rising, values) ** 2
@@ -260,11 +263,11 @@ class _SplineRows:
         return np.asarray(np.maximum(central, horn_x**2 + horn_y**2))
 
 
-def _gathered(found: Any, samples: Array, step: int) -> Any:
+def _gathered(found: Array | None, samples: Array, step: int) -> Array:
     """The largest of the samples of each cell so far, (n, m).
 
-    samples : (n, m) at the knots, in step 0; then (n - 1, m), so many quarters of the way to
-    the next knot. Those half way belong to the cells on both sides.
+    samples : (n, m) at the knots in step 0; then (n - 1, m), ``step`` quarters from one knot to
+    the next. Those in the middle belong to the cells on both sides.
     """
     if found is None:
         return samples

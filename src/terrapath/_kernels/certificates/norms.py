@@ -1,4 +1,4 @@
-"""What is proven of a function u over boxes; the checker's own, and nothing of the solver's."""
+"""What is proven of a function u over boxes. The checker uses this, and the solver does not."""
 
 import math
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from .taylor import (
 )
 
 
-class Bound(NamedTuple):
+class Potential(NamedTuple):
     """A function u, bicubic over the cells of a grid."""
 
     coefficients: np.ndarray  # (ny + 2, nx + 2) float64
@@ -37,25 +37,25 @@ class Bound(NamedTuple):
 def share_of_cell(share, half):
     """The share of its cell at which a box has its centre, exact for a box on the cell's side.
 
-    There one of four coefficients counts for nothing. The cube of a rounding error would let
-    it count, and it may be as large as somebody likes where no cell depends on it.
+    On a side, one of the four coefficients has the factor 0. With a rounding error it would
+    count, and it can be huge, for no cell may depend on it.
     """
     return math.floor(share + 0.5) if half == 0.0 else share
 
 
 @inner_kernel
-def bound_over(bound, i, j, box):
+def potential_over(potential, i, j, box):
     """Models of u and its slopes over a box inside cell (i, j), or on a side of it."""
     return spline_models(
-        bound.coefficients,
+        potential.coefficients,
         i,
         j,
-        share_of_cell((box.x - bound.x0) / bound.dx - i, box.a),
-        share_of_cell((box.y - bound.y0) / bound.dy - j, box.b),
-        box.a / bound.dx,
-        box.b / bound.dy,
-        bound.dx,
-        bound.dy,
+        share_of_cell((box.x - potential.x0) / potential.dx - i, box.a),
+        share_of_cell((box.y - potential.y0) / potential.dy - j, box.b),
+        box.a / potential.dx,
+        box.b / potential.dy,
+        potential.dx,
+        potential.dy,
     )
 
 
@@ -96,7 +96,7 @@ def planar_distance(box, goal):
 
 
 @kernel
-def facts_of_box(surface, bound, goal, i, j, box, work):
+def facts_of_box(surface, potential, goal, i, j, box, work):
     """Bounds over a box inside cell (i, j) and one piece of the surface.
 
     With slopes g_k of the weighted layers, h = c^2 H, H = I + sum g_k g_k^T and
@@ -106,7 +106,7 @@ def facts_of_box(surface, bound, goal, i, j, box, work):
 
     goal (2 + layers,) is the goal's lifted point; work (2 layers, 11).
     """
-    u = bound_over(bound, i, j, box)
+    u = potential_over(potential, i, j, box)
     top = plus(times(u.slope_x, u.slope_x), times(u.slope_y, u.slope_y))
     bottom = constant(1.0)
     chord = planar_distance(box, goal) ** 2
@@ -187,30 +187,30 @@ def piece(cutting, p, q):
 
 
 class Pieces(NamedTuple):
-    """How many pieces a cell is cut into, each way."""
+    """How many columns and rows of pieces a cell is cut into."""
 
     columns: int
     rows: int
 
 
 @inner_kernel
-def cut_cell(surface, bound, i, j, cutting):
-    x, y = bound.x0 + i * bound.dx, bound.y0 + j * bound.dy
+def cut_cell(surface, potential, i, j, cutting):
+    x, y = potential.x0 + i * potential.dx, potential.y0 + j * potential.dy
     return Pieces(
-        cut_at_knots(surface, 0, x, x + bound.dx, cutting.x),
-        cut_at_knots(surface, 1, y, y + bound.dy, cutting.y),
+        cut_at_knots(surface, 0, x, x + potential.dx, cutting.x),
+        cut_at_knots(surface, 1, y, y + potential.dy, cutting.y),
     )
 
 
 @kernel
-def need_of_cell(surface, bound, goal, horizon, i, j, cutting):
-    """The least M of cell (i, j), as the models over its whole pieces tell."""
-    pieces = cut_cell(surface, bound, i, j, cutting)
+def need_of_cell(surface, potential, goal, horizon, i, j, cutting):
+    """The least M of cell (i, j), by the models over its whole pieces."""
+    pieces = cut_cell(surface, potential, i, j, cutting)
     proven, likely, slope = 0.0, 0.0, 0.0
     for q in range(pieces.rows):
         for p in range(pieces.columns):
             box = piece(cutting, p, q)
-            facts = facts_of_box(surface, bound, goal, i, j, box, cutting.work)
+            facts = facts_of_box(surface, potential, goal, i, j, box, cutting.work)
             need = need_of_box(facts, horizon)
             proven, likely = max(proven, need.proven), max(likely, need.likely)
             slope = max(slope, need.slope)
@@ -225,7 +225,7 @@ DEPTH = 6
 
 
 @kernel
-def norm_of_box(surface, bound, goal, horizon, i, j, box, norm, cutting):
+def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, cutting):
     """The least M, ``norm`` or above, that is enough for a box; it is cut up where that helps."""
     boxes = cutting.boxes
     boxes[0, 0], boxes[0, 1], boxes[0, 2], boxes[0, 3], boxes[0, 4] = (
@@ -239,7 +239,7 @@ def norm_of_box(surface, bound, goal, horizon, i, j, box, norm, cutting):
     while waiting > 0:
         waiting -= 1
         x, y, a, b, depth = boxes[waiting]
-        facts = facts_of_box(surface, bound, goal, i, j, Box(x, y, a, b), cutting.work)
+        facts = facts_of_box(surface, potential, goal, i, j, Box(x, y, a, b), cutting.work)
         need = need_of_box(facts, horizon)
         if need.proven <= norm:
             continue
@@ -256,45 +256,50 @@ def norm_of_box(surface, bound, goal, horizon, i, j, box, norm, cutting):
 
 
 @kernel
-def cheap_need(floor, bound, goal, horizon, i, j):
+def cheap_need(floor, potential, goal, horizon, i, j):
     """An M that is enough for cell (i, j), from u's coefficients and the planar distance alone."""
     lowest = math.inf
     for q in range(4):
         for k in range(4):
-            lowest = min(lowest, bound.coefficients[j + q, i + k])
+            lowest = min(lowest, potential.coefficients[j + q, i + k])
     if lowest >= horizon:
         return 0.0
-    half_x, half_y = 0.5 * bound.dx, 0.5 * bound.dy
-    box = Box(bound.x0 + i * bound.dx + half_x, bound.y0 + j * bound.dy + half_y, half_x, half_y)
+    half_x, half_y = 0.5 * potential.dx, 0.5 * potential.dy
+    box = Box(
+        potential.x0 + i * potential.dx + half_x,
+        potential.y0 + j * potential.dy + half_y,
+        half_x,
+        half_y,
+    )
     distance = floor * planar_distance(box, goal)
     return (horizon - lowest) / distance if distance > 0.0 else math.inf
 
 
 @kernel
-def fill_needs(surface, bound, goal, horizon, exempt, enough, cutting, proven, likely, slope):
-    """An M that is enough for each cell (ny, nx), 0 where exempt; not looked at closely.
+def fill_needs(surface, potential, goal, horizon, exempt, enough, cutting, proven, likely, slope):
+    """A rough M that is enough for each cell (ny, nx); 0 where exempt.
 
-    ``enough`` : an M that is fine, so that nothing better is looked for.
+    ``enough`` : where an M as low as this is proven, no lower one is looked for.
     """
     for j in range(proven.shape[0]):
         for i in range(proven.shape[1]):
             proven[j, i] = 0.0
             if not exempt[j, i]:
-                proven[j, i] = cheap_need(floor_of(surface), bound, goal, horizon, i, j)
+                proven[j, i] = cheap_need(floor_of(surface), potential, goal, horizon, i, j)
             likely[j, i], slope[j, i] = proven[j, i], 0.0
             if proven[j, i] > enough:
-                need = need_of_cell(surface, bound, goal, horizon, i, j, cutting)
+                need = need_of_cell(surface, potential, goal, horizon, i, j, cutting)
                 proven[j, i] = min(proven[j, i], need.proven)
                 likely[j, i] = min(proven[j, i], need.likely)
                 slope[j, i] = need.slope
 
 
 @kernel
-def least_norm(surface, bound, goal, horizon, order, needs, norm, cutting):
+def least_norm(surface, potential, goal, horizon, order, needs, norm, cutting):
     """The least M, ``norm`` or above, that is enough for all cells.
 
     needs (ny, nx) : what is proven to be enough. order : numbers of the cells, by falling
-    need, so that those which settle M are looked at first.
+    need, so that the cells that decide M come first.
     """
     columns = needs.shape[1]
     for n in order:
@@ -302,11 +307,11 @@ def least_norm(surface, bound, goal, horizon, order, needs, norm, cutting):
         if needs[j, i] <= norm:
             break
         found = norm
-        pieces = cut_cell(surface, bound, i, j, cutting)
+        pieces = cut_cell(surface, potential, i, j, cutting)
         for q in range(pieces.rows):
             for p in range(pieces.columns):
                 box = piece(cutting, p, q)
-                found = norm_of_box(surface, bound, goal, horizon, i, j, box, found, cutting)
+                found = norm_of_box(surface, potential, goal, horizon, i, j, box, found, cutting)
         norm = min(found, needs[j, i])
     return norm
 
@@ -327,7 +332,7 @@ class Anchor(NamedTuple):
 
 
 @kernel
-def margin_of_box(surface, bound, anchor, factor, i, j, box):
+def margin_of_box(surface, potential, anchor, factor, i, j, box):
     """At most distance(anchor, p) + factor u(p) for any p of a box inside cell (i, j).
 
     The chord is convex in R^n, so that it is nowhere below its tangent at the box's centre.
@@ -339,7 +344,7 @@ def margin_of_box(surface, bound, anchor, factor, i, j, box):
         rise = layer_over(surface, k, box).value.c00 - end[2 + k]
         squared += rise * rise
     chord = math.sqrt(squared)
-    total = times_number(bound_over(bound, i, j, box).value, factor)
+    total = times_number(potential_over(potential, i, j, box).value, factor)
     outside_margin = anchor.far + total.c00 - spread(total)
     if chord > 0.0:
         along_x, along_y = floor * box.a * east / chord, floor * box.b * north / chord
@@ -355,15 +360,15 @@ def margin_of_box(surface, bound, anchor, factor, i, j, box):
     return margin if margin > -math.inf else -math.inf
 
 
-# A cell's side on the core's edge is cut into so many parts.
+# A cell's side on the core's edge is cut into this many parts.
 PARTS = 8
 
 
 @kernel
-def margin_of_side(surface, bound, anchor, factor, i, j, axis, at, cutting):
+def margin_of_side(surface, potential, anchor, factor, i, j, axis, at, cutting):
     """The least margin along a side of cell (i, j): along ``axis``, at ``at`` on the other."""
-    low = bound.x0 + i * bound.dx if axis == 0 else bound.y0 + j * bound.dy
-    high = low + (bound.dx if axis == 0 else bound.dy)
+    low = potential.x0 + i * potential.dx if axis == 0 else potential.y0 + j * potential.dy
+    high = low + (potential.dx if axis == 0 else potential.dy)
     cuts = cutting.x if axis == 0 else cutting.y
     margin = math.inf
     for k in range(cut_at_knots(surface, axis, low, high, cuts)):
@@ -371,22 +376,22 @@ def margin_of_side(surface, bound, anchor, factor, i, j, axis, at, cutting):
         for m in range(PARTS):
             middle = cuts[k] + (2 * m + 1) * half
             box = Box(middle, at, half, 0.0) if axis == 0 else Box(at, middle, 0.0, half)
-            margin = min(margin, margin_of_box(surface, bound, anchor, factor, i, j, box))
+            margin = min(margin, margin_of_box(surface, potential, anchor, factor, i, j, box))
     return margin
 
 
 @kernel
-def margin_of_core(surface, bound, anchor, factor, i0, i1, j0, j1, cutting):
+def margin_of_core(surface, potential, anchor, factor, i0, i1, j0, j1, cutting):
     """The least margin on the edge of the cells [i0, i1) x [j0, j1)."""
     margin = math.inf
-    left, right = bound.x0 + i0 * bound.dx, bound.x0 + i1 * bound.dx
-    bottom, top = bound.y0 + j0 * bound.dy, bound.y0 + j1 * bound.dy
+    left, right = potential.x0 + i0 * potential.dx, potential.x0 + i1 * potential.dx
+    bottom, top = potential.y0 + j0 * potential.dy, potential.y0 + j1 * potential.dy
     for i in range(i0, i1):
         for j, at in ((j0, bottom), (j1 - 1, top)):
-            side = margin_of_side(surface, bound, anchor, factor, i, j, 0, at, cutting)
+            side = margin_of_side(surface, potential, anchor, factor, i, j, 0, at, cutting)
             margin = min(margin, side)
     for j in range(j0, j1):
         for i, at in ((i0, left), (i1 - 1, right)):
-            side = margin_of_side(surface, bound, anchor, factor, i, j, 1, at, cutting)
+            side = margin_of_side(surface, potential, anchor, factor, i, j, 1, at, cutting)
             margin = min(margin, side)
     return margin

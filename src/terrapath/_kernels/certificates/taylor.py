@@ -1,10 +1,10 @@
-"""Taylor models: polynomials on a box that carry a proven bound of their error.
+"""Taylor models: polynomials on a box, with a proven limit on their error.
 
 A Taylor model of a function on a box is a polynomial of degree 3 in coordinates (p, q) that
-run over [-1, 1]^2, and a bound r on what the function differs from it anywhere in the box.
-Sums and products of models are models, so that terms which cancel do so exactly: the bound
-on a dual norm that is 1 up to a small smooth error is 1 up to that error, whatever the
-slopes (Makino and Berz 2003). The checker's own: nothing of the solver's uses it.
+run over [-1, 1]^2, and a remainder r: nowhere in the box do the function and the polynomial
+differ by more. Sums and products of models are models, so terms that cancel do so exactly.
+For a dual norm that is 1 up to a small smooth error, the model proves 1 up to that error,
+whatever the slopes (Makino and Berz 2003). The checker uses this, and the solver does not.
 """
 
 import math
@@ -14,7 +14,7 @@ from ..compiler import inner_kernel, kernel
 
 
 class Model(NamedTuple):
-    """Sum of c_ij p^i q^j, give or take r."""
+    """Sum of c_ij p^i q^j, plus or minus at most r."""
 
     c00: float
     c10: float

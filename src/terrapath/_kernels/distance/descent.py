@@ -1,4 +1,4 @@
-"""Values between the nodes of a distance field, and the way back to the source.
+"""Values between the nodes of a distance field, and paths back to the source.
 
 Where the field is smooth, both follow from cubic interpolation. At kinks, where shortest
 paths from two sides meet, the scheme's own values are a little too low and a cubic's slope
@@ -297,10 +297,10 @@ def nodes_apart(grid, ax, ay, bx, by):
 
 @kernel
 def approach(surface, space, field, x, y, level):
-    """The best approach to (x, y) from around, and from the source where that is near.
+    """The best last segment of a path to (x, y), from nearby nodes or from the source.
 
     It begins where u is less than ``level``; ``end`` is infinite where there is none. Smaller
-    rings are looked at only where something blocks the view of the larger.
+    rings of nodes are tried only where something blocks the view of the larger.
     """
     grid, best = field.grid, Approach(x, y, math.inf, math.inf, level)
     if nodes_apart(grid, x, y, field.source_x, field.source_y) <= RING + 1.0:
@@ -324,7 +324,7 @@ def fill_distances(surface, space, field, points, values):
             values[m] = approach(surface, space, field, x, y, math.inf).end
 
 
-# The way back to the source
+# Paths back to the source
 
 
 @inner_kernel
@@ -334,7 +334,7 @@ def clamp(x, low, high):
 
 @inner_kernel
 def step_down(grid, x, y, slope, step):
-    """A step of so many nodes against a slope, kept on the lattice."""
+    """A step against a slope, kept on the lattice; ``step`` counts in nodes."""
     step /= nodes_apart(grid, slope.x, slope.y, 0.0, 0.0)
     right, top = grid.x0 + (grid.nx - 1) * grid.dx, grid.y0 + (grid.ny - 1) * grid.dy
     return clamp(x - step * slope.x, grid.x0, right), clamp(y - step * slope.y, grid.y0, top)

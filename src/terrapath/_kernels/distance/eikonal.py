@@ -94,8 +94,8 @@ def first_order(u, node, nx, n):
     )
 
 
-# Second-order differences are used where the slope behind is at most so many times the slope
-# ahead: past that the field is not smooth there.
+# Second-order differences are used where the slope behind is at most this many times the slope
+# ahead. Elsewhere the field is not smooth.
 STEEPEST = 2.0
 
 
@@ -153,7 +153,7 @@ def upwind(u, links, n, step, side):
 
 @inner_kernel
 def linked_difference(u, trial, links, n, step, side, rho):
-    """``difference`` where the links tell which neighbours may be used."""
+    """``difference``, of the neighbours that links lead to."""
     found = upwind(u, links, n, step, side)
     return difference(trial, found.near, found.far, rho)
 
@@ -234,7 +234,7 @@ def second_order(u, trial, node, source, nx, n):
 
 @kernel
 def by_edges(nodes, u, nx, n):
-    """The least value of node n by way of one edge."""
+    """The least value of node n along a single edge."""
     best = math.inf
     for k in range(AROUND):
         if nodes[n].around >> k & 1:

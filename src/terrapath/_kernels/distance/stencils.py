@@ -61,8 +61,8 @@ def inverse(h):
 class Vector(NamedTuple):
     """A lattice vector."""
 
-    x: int
-    y: int
+    x: np.int64
+    y: np.int64
 
 
 @inner_kernel
@@ -165,7 +165,7 @@ def per_node(h11, h12, h22, grid):
 def lay_surface_stencils(surface, grid, columns, row, nodes):
     """Stencils of a surface's metric at all nodes of a lattice.
 
-    columns : of ``columns_of``; row : room for ``fill_row``.
+    columns : of ``columns_of``; row : workspace of ``fill_row``.
     """
     b = Superbase(1.0, 0.0, 0.0, 1.0)
     for j in range(grid.ny):

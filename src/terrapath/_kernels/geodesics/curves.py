@@ -5,7 +5,7 @@ from ..compiler import kernel
 
 @kernel
 def fill_basis(knots, degree, shares, first, weights):
-    """The B-splines that are not 0 at shares (m,) of the way, between the outermost knots.
+    """The B-splines that are not 0 at parameters (m,) between the outermost knots.
 
     first (m,) : which is the first of them. weights (m, degree + 1) : their values.
     """

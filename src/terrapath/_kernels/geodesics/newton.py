@@ -63,7 +63,7 @@ class Strand(NamedTuple):
     drift: np.ndarray  # (m - 2, 2): |s'|^2 / 2 grad C there
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """What a step of Newton's method is worked out in, and what it finds."""
 
     derivative: np.ndarray  # (m - 2, 2), half the energy's by each inner point
@@ -233,7 +233,7 @@ def downward(pivots, links, step, row):
 
 
 @kernel
-def newton_step(strand, projectors, curvature, room):
+def newton_step(strand, projectors, curvature, workspace):
     """Newton's step for the inner points of a polyline; both ends stay.
 
     projectors : (m - 2, 2, 2), onto the moves that each point is free to make.
@@ -242,15 +242,15 @@ def newton_step(strand, projectors, curvature, room):
     Where H is not positive definite, a direction of negative curvature instead. Returns
     whether it is.
     """
-    derivative, step = room.derivative, room.move
+    derivative, step = workspace.derivative, workspace.move
     fill_derivative(strand, projectors, derivative)
     for i in range(step.shape[0]):
         step[i, 0], step[i, 1] = derivative[i, 0], derivative[i, 1]
-    rows = eliminate(strand, projectors, curvature, room.pivots, room.links, step)
+    rows = eliminate(strand, projectors, curvature, workspace.pivots, workspace.links, step)
     if rows < step.shape[0]:
-        downward(room.pivots, room.links, step, rows)
+        downward(workspace.pivots, workspace.links, step, rows)
         return False
-    substitute(room.pivots, room.links, step, rows)
+    substitute(workspace.pivots, workspace.links, step, rows)
     return True
 
 

@@ -33,8 +33,8 @@ def dormand_prince():
 
 _SAFETY, _LEAST_FACTOR, _MOST_FACTOR = 0.9, 0.2, 6.0
 
-# A step this short, as a share of the way to it and of the unit of length, leads nowhere:
-# there is no curve through two rows that only rounding tells apart.
+# A step is too short to be taken at this share of the arc length so far and of the unit of
+# length: no curve leads through two rows that differ by rounding alone.
 _NOWHERE = 1e-15
 
 # How a ray ended.

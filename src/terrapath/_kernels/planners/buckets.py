@@ -51,9 +51,9 @@ def put(buckets, points, p):
 
 @kernel
 def resize(buckets, width, height, side):
-    """Empty buckets of the given side, or as small as there is room for."""
-    room = buckets.head.shape[0]
-    side = max(side, math.sqrt(2.0 * width * height / room), 2.0 * max(width, height) / room)
+    """Empty buckets of the given side, or the smallest ones that the arrays can hold."""
+    most = buckets.head.shape[0]
+    side = max(side, math.sqrt(2.0 * width * height / most), 2.0 * max(width, height) / most)
     buckets.frame[2] = side
     buckets.shape[0] = max(int(width / side), 1)
     buckets.shape[1] = max(int(height / side), 1)

@@ -2,7 +2,7 @@
 
 Start and goal rarely lie on a node: they are two further vertices, joined to the nodes
 nearby. An edge is as long as in the tree planners, max(Line-R, chord). So the chord to the
-goal is a consistent heuristic, and the first way on which a vertex is settled is its shortest.
+goal is a consistent heuristic, and the first path that settles a vertex is its shortest.
 """
 
 import math
@@ -17,7 +17,7 @@ from .tree import COST, TENSOR, X, Y, chord_between, edge_length, survey
 
 # Places in Graph.counters.
 OPEN = 0  # vertices in the heap
-SETTLED = 1  # vertices whose shortest way is known
+SETTLED = 1  # vertices whose shortest path is known
 VERTICES = 2  # vertices that an edge was considered to
 CONSIDERED = 3  # edges considered
 PRUNED = 4  # edges that the chord ruled out
@@ -28,9 +28,9 @@ COUNTERS = 7
 # What a vertex's slot says where it is not in the heap, whose first slot is 1.
 UNSEEN = 0
 DONE = -1
-WITHOUT_WAY = -2
+WITHOUT_PATH = -2
 
-# A vertex: the way to it, its slot of the heap, and the metric tensor. That comes last: to
+# A vertex: its parent, its slot of the heap, and the metric tensor. That comes last: to
 # Numba, a tensor with more behind it would be a tensor.
 VERTEX = record(
     ("parent", np.int32),  # -1 at the start
@@ -123,12 +123,12 @@ def take_first(vertices, heap, last):
 
 @kernel
 def place(surface, graph, v, x, y):
-    """Write a vertex's position and what is cached with it; no way leads there yet."""
+    """Write a vertex's position and what is cached with it; no path leads there yet."""
     survey(surface, graph, v, x, y)
     graph.places[v, COST] = math.inf
     vertex = graph.vertices[v]
     vertex.parent = -1
-    vertex.slot = WITHOUT_WAY
+    vertex.slot = WITHOUT_PATH
     graph.counters[VERTICES] += 1
 
 
@@ -146,7 +146,7 @@ def enter(graph, options, v):
     if options.informed:
         key += chord_between(graph, v, graph.vertices.shape[0] - 1)
     slot = graph.vertices[v].slot
-    if slot == WITHOUT_WAY:
+    if slot == WITHOUT_PATH:
         graph.counters[OPEN] += 1
         slot = graph.counters[OPEN]
     raise_to(graph.vertices, graph.heap, slot, v, key)
@@ -154,7 +154,7 @@ def enter(graph, options, v):
 
 @kernel
 def measure(surface, space, graph, options, u, v, chord):
-    """Measure the edge u-v, and let the way to v go through it where that is shorter."""
+    """Measure the edge u-v, and let the path to v end with it where that is shorter."""
     origin, place = graph.places[u], graph.places[v]
     graph.counters[INTEGRATED] += 1
     length = max(edge_length(surface, graph, u, v, options.panel), chord)
@@ -169,7 +169,7 @@ def measure(surface, space, graph, options, u, v, chord):
 
 @inner_kernel
 def relax(surface, space, nodes, graph, options, u, v):
-    """Let the way to v go through u where that is shorter.
+    """Let the path to v go through u where that is shorter.
 
     An edge whose cost-to-come plus chord cannot win is never integrated.
     """

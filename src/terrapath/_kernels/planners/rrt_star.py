@@ -5,7 +5,7 @@ Cost(v_new) after it changes v_min; that update is meant, and made. The goal joi
 tree as a vertex as soon as one extension can reach it, and from then on is rewired like
 any other. An edge is as long as Line-R says but never shorter than its chord: both
 estimate its true length, and the chord is never above it. An informed tree tries the straight
-way to the goal first, and hangs new vertices below their parents' parents where that is shorter.
+line to the goal first, and hangs new vertices below their parents' parents where that is shorter.
 """
 
 import math
@@ -117,9 +117,9 @@ def find_near(tree, options, radius, x, y):
 
 @inner_kernel
 def measure_chord(tree, new, k):
-    """Lay out the k-th candidate's chord and cost; return their sum.
+    """Write down the k-th candidate's chord and cost; return their sum.
 
-    No way through it to the new vertex is shorter.
+    No path through it to the new vertex is shorter.
     """
     candidate = tree.near[k]
     rise = squared_rise(tree, new, candidate.vertex)
@@ -132,16 +132,16 @@ def measure_chord(tree, new, k):
 
 @kernel
 def measure_chords(tree, new, count):
-    """Lay out the candidates' chords and costs; return the most promising one.
+    """Write down the candidates' chords and costs; return the most promising one.
 
     That is the one whose cost plus chord is least.
     """
     promising = -1
     least = math.inf
     for k in range(count):
-        bound = measure_chord(tree, new, k)
-        if bound < least:
-            promising, least = k, bound
+        at_least = measure_chord(tree, new, k)
+        if at_least < least:
+            promising, least = k, at_least
     return promising
 
 
@@ -183,9 +183,9 @@ def is_shorter(surface, space, tree, options, new, ancestor, spare):
     candidate.squared = squared_distance(tree.places, ancestor, p[X], p[Y])
     if candidate.squared > options.step * options.step:
         return False
-    bound, least = measure_chord(tree, new, spare), p[COST]
+    at_least, least = measure_chord(tree, new, spare), p[COST]
     tree.counters[CONSIDERED] += 1
-    if options.prune and bound >= least:
+    if options.prune and at_least >= least:
         tree.counters[PRUNED] += 1
         return False
     length = candidate_length(surface, tree, options, new, spare)
@@ -208,11 +208,11 @@ def skip_parents(surface, space, tree, options, new, spare):
 
 @kernel
 def rewire(surface, space, tree, options, new, count):
-    """Hang candidates below the new vertex where that shortens their way.
+    """Hang candidates below the new vertex where that shortens the path to them.
 
     Costs are compared as they were before this extension, Cost in the graph G of Algorithm 3.
-    Rewiring one candidate can shorten the way to another; looking at that would let the order
-    in which the candidates are visited decide the tree.
+    Rewiring one candidate can shorten the path to another. That is left out, for otherwise the
+    tree would depend on the order in which candidates are visited.
     """
     come, parent = tree.places[new, COST], tree.links[new].parent
     rewired, pruned = 0, 0

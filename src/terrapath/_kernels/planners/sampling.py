@@ -51,7 +51,7 @@ def is_within_bounds(options, x, y):
 
 @kernel
 def can_improve(surface, tree, x, y):
-    """Could a path through (x, y) beat the best one? By the chord bound, in R^n."""
+    """Could a path through (x, y) beat the best one? By the chords to its ends, in R^n."""
     goal = tree.counters[GOAL]
     from_start = squared_distance(tree.places, 0, x, y)
     to_goal = squared_distance(tree.places, goal, x, y)

@@ -202,8 +202,8 @@ def pass_on_cost(tree, count):
             child = tree.links[child].sibling
 
 
-# Vertices that lie near one another are looked at together. In the order in which they came
-# they would be strewn over the memory, and most of the time would go by waiting for them.
+# Vertices that lie near one another are read together. In the order of their age they would be
+# spread over the memory, and most of the time would be spent on waiting for it.
 
 
 @inner_kernel
@@ -220,7 +220,7 @@ def swap_records(records, p, q, spare):
 
 @inner_kernel
 def swap(tree, p, q, spare):
-    """Swap two vertices, by way of a spare one."""
+    """Swap two vertices, with the help of a spare one."""
     swap_records(tree.vertices, p, q, spare)
     swap_records(tree.links, p, q, spare)
     for entry in range(tree.places.shape[1]):

@@ -82,7 +82,7 @@ def columns_crossed(grid, row, ax, ay, bx, by):
     return span(min(x0, x1), max(x0, x1), grid.x0, grid.dx, grid.nx)
 
 
-# Twice the bound of Shewchuk (1997) on the rounding error of an orientation determinant.
+# Twice the largest rounding error of an orientation determinant (Shewchuk 1997).
 _ORIENTATION_ERROR = 8.0 * 2.0**-52
 
 
@@ -185,7 +185,7 @@ def fill_free(space, a, b, free):
 
 @kernel
 def enlist(item, cell, first, ids):
-    """Count an item of a cell, or note it where ``ids`` has room."""
+    """Count an item of a cell; where ``ids`` is not empty, list it there instead."""
     if ids.shape[0] > 0:
         ids[first[cell]] = item
         first[cell] += 1
@@ -195,9 +195,9 @@ def enlist(item, cell, first, ids):
 
 @kernel
 def list_edges(grid, edges, first, ids):
-    """Count the edges of each cell into first[cell + 1]; with room in ``ids``, list them.
+    """Count the edges of each cell into first[cell + 1], or list them in ``ids``.
 
-    Called twice: with an empty ``ids`` to count; then, ``first`` summed up, to fill.
+    Called twice: first with an empty ``ids``, to count; then, with ``first`` summed up, to list.
     """
     for e in range(edges.shape[0]):
         ax, ay, bx, by = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]

@@ -19,8 +19,8 @@ def norm(h, dx, dy):
 def composite_boole(surface, ax, ay, dx, dy, ends, panels):
     """Line-R with the segment cut into equal panels; ``panels = 1`` is Algorithm 1.
 
-    ends : |v|_h of one panel's way v = (dx, dy) at both ends of the segment, summed: a tree
-    knows the metric at its nodes.
+    ends : |v|_h at both ends of the segment, summed, v = (dx, dy) being one panel. It is passed
+    in because a tree knows the metric at its vertices.
     """
     length = 7.0 / 90.0 * ends
     weights = four(16.0 / 45.0, 2.0 / 15.0, 16.0 / 45.0, 0.0)
@@ -109,7 +109,7 @@ def piece_length(surface, x, y, vx, vy, tolerance):
     Pieces are halved until each one's error estimate is under ``tolerance`` times the whole.
     """
     length, allowed = 0.0, 0.0
-    k, pieces = 0, 1  # the k-th of so many equal ones is next
+    k, pieces = 0, 1  # of the equal pieces the k-th is next
     while k < pieces:
         share = 0.5 / pieces
         middle, wx, wy = (2 * k + 1) * share, share * vx, share * vy

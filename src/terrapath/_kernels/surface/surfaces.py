@@ -322,7 +322,7 @@ def spline_speeds_along(surface, x, y, vx, vy, shares):
 
 @per_class({Peaks: peaks_speeds_along, Spline: spline_speeds_along})
 def speeds_along(surface, x, y, vx, vy, shares):
-    """|v|_h at four shares of the way from (x, y) on by v."""
+    """|v|_h at four shares of the segment from (x, y) to (x, y) + v."""
 
 
 @inner_kernel
@@ -342,9 +342,9 @@ def spline_speeds_inside(surface, x, y, vx, vy):
 
 @per_class({Peaks: peaks_speeds_inside, Spline: spline_speeds_inside})
 def speeds_inside(surface, x, y, vx, vy):
-    """|v|_h at a quarter, a half and three quarters of the way from (x, y) on by v, as four.
+    """|v|_h at a quarter, a half and three quarters of the segment from (x, y) to (x, y) + v.
 
-    What the last of four is does not matter.
+    Of the four numbers returned, the last does not matter.
     """
 
 

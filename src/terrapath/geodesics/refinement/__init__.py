@@ -1,64 +1,78 @@
-"""From any planner's path to the exact locally shortest path around it."""
+"""From any planner's path to the exact locally shortest path near it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ...errors import InputError
 from ...problem import Path, Problem
 from ...surface import Surface
 from ...validation import Array, as_array, require_positive
 from .newton import shortest_polyline
-from .smooth import correct, curve_through, laid_shares
-from .taut import taut_paths
+from .smooth import correct, curve_through, placed_parameters
 
 __all__ = ["refine", "shortest_polyline"]
 
-TOLERANCE = 3e-8  # relative excess of the polyline's length over the geodesic's
+TOLERANCE = 3e-8  # by which the polyline may be longer than the geodesic, relative
 
-# Pieces of the polyline: at first one a feature of the surface, then by stages as many as
-# make the geodesic through its points exact.
+# The number of pieces of the polyline grows in stages: from one for each feature of the surface to
+# as many as make the geodesic through its points exact.
 FEWEST_PIECES, MOST_PIECES = 32, 4096
 PIECES_PER_FEATURE = 8.0
 STAGES = 3
 
-# A path whose ends are this near to the problem's, as a share of the region, starts there.
+# A path begins at the problem's start if it begins within this share of the region's side of it;
+# likewise at the goal.
 SAME_PLACE = 1e-9
-# A path may be found longer by this share before the one given is preferred to it.
+# The path found may be longer than the one given by this share, which allows for rounding.
 ROUNDING = 1e-12
 
 
-def refine(problem: Problem, path: Any, *, tolerance: float = TOLERANCE) -> Path:
-    """The locally shortest path that a path can be pulled taut to, in free space throughout.
+def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = TOLERANCE) -> Path:
+    """The locally shortest path near a path: what it becomes when it is pulled taut.
 
     path : Path or (m, 2) array, map units, from the problem's start to its goal through free
-    space, such as any planner's. Where it touches nothing, the path returned is longer than
-    the exact geodesic by ``tolerance``, relative; 8,192 points are laid at most. Where
-    obstacles or the edge of the bounds are in the way, it bends round them at a distance of
-    1e-8 of the region's side. It is never longer than the path given, and never passes an
-    obstacle on another side.
-    Raises InputError where the path does not join start and goal or is not free.
+    space; any planner's will do. tolerance : by which the path returned may be longer than the
+    exact geodesic, relative. It holds where the path touches nothing, and as long as 8,192 points
+    are enough. The path bends round obstacles, and the edge of the bounds, at a distance of 1e-8
+    of the region's side. It is never longer than the path given, stays in free space, and passes
+    each obstacle on the same side.
+    Raises InputError where the path does not join start and goal, or is not in free space.
     """
     require_positive(tolerance=tolerance)
     given = problem.path(_checked(problem, path))
     best = given
     for points in _refined(problem, given, tolerance):
         found = problem.path(points)
-        # Of two that are as long, the later has no more points than it needs.
+        # Of two that are equally long, the later one has fewer points.
         longest = min(best.length * (1.0 + tolerance), given.length * (1.0 + ROUNDING))
         if _is_allowed(problem, points) and found.length <= longest:
             best = found
     return best
 
 
-def _checked(problem: Problem, path: Any) -> Array:
-    """The points of a path from start to goal through free space, repeated ones left out."""
+def _checked(problem: Problem, path: Path | npt.ArrayLike) -> Array:
+    """The points of a path from start to goal through free space, without repeated ones.
+
+    Raises InputError where it is none.
+    """
     given = path.points if isinstance(path, Path) else path
     points = as_array(given, "path", shape=(None, 2)).copy()
+    _join_ends(problem, points)
+    moved = (np.diff(points, axis=0) != 0.0).any(axis=1)
+    points = np.concatenate([points[:1], points[1:][moved]])
+    if len(points) == 1:
+        points = np.repeat(points, 2, axis=0)
+    _require_free(problem, points)
+    return points
+
+
+def _join_ends(problem: Problem, points: Array) -> None:
+    """Put a path's ends exactly onto the problem's start and goal."""
     if len(points) < 2:
         raise InputError(f"path has {len(points)} points; give at least the start and the goal")
     for index, name, end in ((0, "start", problem.start), (-1, "goal", problem.goal)):
@@ -69,10 +83,10 @@ def _checked(problem: Problem, path: Any) -> Array:
                 f"problem's {name} ({end[0]:.10g}, {end[1]:.10g}); refine it in its own problem"
             )
         points[index] = end
-    moved = (np.diff(points, axis=0) != 0.0).any(axis=1)
-    points = np.concatenate([points[:1], points[1:][moved]])
-    if len(points) == 1:
-        points = np.repeat(points, 2, axis=0)
+
+
+def _require_free(problem: Problem, points: Array) -> None:
+    """Raise InputError where a path is not within the bounds and in free space."""
     if not (inside := problem.bounds.contains(points)).all():
         x, y = points[~inside][0]
         raise InputError(
@@ -87,7 +101,6 @@ def _checked(problem: Problem, path: Any) -> Array:
             f"the path's segment ({ax:.10g}, {ay:.10g}) to ({bx:.10g}, {by:.10g}) touches an "
             "obstacle; refine a path through free space"
         )
-    return points
 
 
 def _is_allowed(problem: Problem, points: Array) -> bool:
@@ -97,7 +110,7 @@ def _is_allowed(problem: Problem, points: Array) -> bool:
 
 
 def _refined(problem: Problem, given: Path, tolerance: float) -> Iterator[Array]:
-    """Polylines (m, 2) that may be shorter, the last of them most likely the shortest."""
+    """Polylines (m, 2) that may be shorter; the last is most likely the shortest."""
     space = problem.free_space
     if given.length == 0.0:
         return
@@ -106,14 +119,16 @@ def _refined(problem: Problem, given: Path, tolerance: float) -> Iterator[Array]
         if all(problem.bounds.contains(points).all() for points in candidates):
             yield from candidates
             return
+    from .taut import taut_paths
+
     yield from taut_paths(problem, given.points, tolerance)
 
 
 def _features(surface: Surface, given: Path) -> float:
-    """Features of the surface along a path, as many as no piece may pass over unseen.
+    """How many features of the surface there are along a path; a piece must not skip one.
 
-    Newton's method makes pieces equally long under h, which counts the cost, whereas features
-    are as large as they are on the plane: where the cost is least, pieces reach farthest.
+    Newton's method makes pieces equally long under h, which includes the cost, but features have
+    their size on the plane. So pieces are longest on the plane where the cost is least.
     """
     length = given.length
     if surface.costs:
@@ -136,14 +151,15 @@ def _along(points: Array, pieces: int) -> Array:
 
 
 def _geodesics(surface: Surface, given: Path, tolerance: float) -> list[Array]:
-    """The geodesic near a path where nothing is in the way, as points laid along it.
+    """The geodesic near a path, as a polyline (m, 2), as if there were no obstacles.
 
-    Where the surface is too rough to be sure of that, the polyline of least energy comes first.
+    Where the surface is too rough for the geodesic to be exact, the polyline of least energy comes
+    before it.
     """
     stages = _stages(_features(surface, given))
     polyline = shortest_polyline(surface, _along(given.points, stages[0]), stages)
     corrected = correct(surface, polyline)
     curve = curve_through(polyline if corrected is None else corrected)
-    points = curve(laid_shares(surface, curve, stages[-1], tolerance))
+    points = curve(placed_parameters(surface, curve, stages[-1], tolerance))
     points[[0, -1]] = given.points[[0, -1]]
     return [polyline, points] if corrected is None else [points]

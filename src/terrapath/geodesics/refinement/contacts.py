@@ -1,16 +1,15 @@
 """Pulling a path taut among obstacles.
 
-A path is a polyline whose points are free, or slide along a wall, or are held by a corner
-that the path bends round. Newton's method says where the points should go. On the way there
-the path is stopped at the first corner that it meets, which then holds it, and points stop at
-the walls that they meet; so it never jumps over an obstacle. When all is still, corners and
-walls that pull at the path rather than push it are let go.
+A path is a polyline. Each of its points is free, or slides along a wall, or is held by a corner
+that the path bends round. Newton's method finds where the points should move. While it moves, the
+path is stopped by the first corner that it meets, which then holds it, and points stop at the walls
+that they meet. So the path never jumps over an obstacle. When it no longer moves, it is released
+from corners and walls that pull it instead of pushing it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,13 +25,13 @@ from .walls import SLACK, Surroundings
 
 NONE = -1
 MOST_ROUNDS = 1500
-# Of one corner. The last piece before a disc is long, and the way it points is off by so much
-# that the corner seems to pull; it is met again as soon as it is let go.
+# A corner is released at most this often. The last piece before a disc is long, and the error of
+# its direction can make the corner seem to pull; after its release it is met again at once.
 MOST_RELEASES = 3
-# Radians that a path turns by at a contact that pulls, before it is let go.
+# A contact that pulls is released where the path turns by more than this at it, radians.
 LEAST_PULL = 1e-6
-# A taut path turns by a right angle at most where it bends round a corner: this is the cosine
-# of more than that. Whatever turns by more goes there and back.
+# The cosine of an angle above a right angle. A taut path turns by a right angle at most where it
+# bends round a corner; one that turns by more goes there and back.
 TURNED_BACK = -0.1
 TINY = 1e-300
 # A point this near to a corner's place, as a share of the clearance, is at it.
@@ -41,10 +40,10 @@ AT_CORNER = 0.05
 
 @dataclass(frozen=True)
 class Band:
-    """A polyline and what holds each of its points.
+    """A polyline, and what holds each of its points.
 
-    points : (m, 2), map units. bends : (m,), the corner a point is at, or NONE.
-    walls : (m, 2), those a point touches, or NONE.
+    points : (m, 2), map units. bends : (m,), the corner that a point is at, or NONE.
+    walls : (m, 2), the walls that a point touches, or NONE.
     """
 
     points: Array
@@ -58,26 +57,26 @@ class Band:
 
     @property
     def is_held(self) -> npt.NDArray[np.bool_]:
-        """(m,): may a point not move at all? So it is for both ends, and at corners."""
+        """(m,), which points may not move: both ends, and points at corners."""
         held = np.asarray(self.bends != NONE)
         held[[0, -1]] = True
         return held
 
-    def inserted(self, before: Indices, points: Array, bends: Any) -> Band:
-        """With further points, each in front of the point of that index."""
+    def inserted(self, before: Indices, points: Array, bends: Indices | int) -> Band:
+        """The band with further points, each in front of the point of index ``before``."""
         return Band(
             np.insert(self.points, before, points, axis=0),
             np.insert(self.bends, before, bends),
             np.insert(self.walls, before, np.full((len(before), 2), NONE), axis=0),
         )
 
-    def chosen(self, which: Any) -> Band:
-        """Some of the points: a slice, indices or (m,) bool."""
+    def chosen(self, which: slice | Indices | npt.NDArray[np.bool_]) -> Band:
+        """The band with only some of its points."""
         return Band(self.points[which], self.bends[which], self.walls[which])
 
 
 def subdivided(band: Band, longest: float) -> Band:
-    """With pieces of at most that length on the plane, map units."""
+    """The band cut into pieces of at most a length on the plane, map units."""
     sizes = np.hypot(*np.diff(band.points, axis=0).T)
     cuts = np.maximum(np.ceil(sizes / longest - 1e-9), 1).astype(int) - 1
     at = np.repeat(np.arange(len(sizes)), cuts)
@@ -100,7 +99,7 @@ def _directions(points: Array) -> Array:
 
 
 def adopted(around: Surroundings, band: Band) -> Band:
-    """With the points held that lie at corners."""
+    """The band with the points that lie at corners held by them."""
     if len(around.corners) == 0:
         return band
     reach = AT_CORNER * float(around.clearance.min())
@@ -115,7 +114,7 @@ def adopted(around: Surroundings, band: Band) -> Band:
 
 
 def projectors(around: Surroundings, band: Band) -> Array:
-    """(m - 2, 2, 2), onto the moves that each inner point may make."""
+    """(m - 2, 2, 2), the projectors onto the moves that each inner point may make."""
     allowed = np.zeros((len(band.points), 2, 2))
     allowed[:, 0, 0] = allowed[:, 1, 1] = 1.0
     sliding = np.flatnonzero(band.walls[:, 0] != NONE)
@@ -129,11 +128,11 @@ def projectors(around: Surroundings, band: Band) -> Array:
 
 
 def advanced(around: Surroundings, band: Band, target: Array) -> tuple[Band, Indices]:
-    """The band moved towards the target (m, 2), as far as obstacles let it.
+    """The band moved towards a target (m, 2), as far as obstacles let it.
 
-    Points stop at the walls that they meet. A stretch between two held points stops where it
-    first meets a corner, which then holds it: the points in front of which these corners were
-    put are returned, too.
+    Points stop at the walls that they meet. The part between two held points stops where it first
+    meets a corner, which then holds it. Also returned are the indices of the points in front of
+    which these corners were inserted.
     """
     moves = target - band.points
     hits = _stop_at_walls(around, band.points, moves)
@@ -151,12 +150,12 @@ def advanced(around: Surroundings, band: Band, target: Array) -> tuple[Band, Ind
     walls[np.flatnonzero(arrived), order] = hits[arrived]
     moved = replace(band, points=points, walls=walls)
     met = np.flatnonzero((times == ends[stretch[:-1]]) & (times <= 1.0))
-    at = met[np.unique(stretch[met], return_index=True)[1]]  # one a stretch
+    at = met[np.unique(stretch[met], return_index=True)[1]]  # one in each part
     return moved.inserted(at + 1, around.corners[corners[at]], corners[at]), at + 1
 
 
 def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices:
-    """The wall that each point meets, or NONE; the moves, written to, end there."""
+    """The wall that each point meets, or NONE. The moves are changed: they end at these walls."""
     times, hits = np.empty(len(moves)), np.empty(len(moves), np.int64)
     kernels.fill_walls(around.walls, points, moves, times, hits)
     met = hits != NONE
@@ -165,11 +164,11 @@ def _stop_at_walls(around: Surroundings, points: Array, moves: Array) -> Indices
     return hits
 
 
-# Letting go
+# Releasing
 
 
 def _forces(path: Strand) -> Array:
-    """Minus the derivative of the length by each inner point, over the cost: (m - 2, 2)."""
+    """(m - 2, 2), minus the derivative of the length by each inner point, divided by the cost."""
     chords, costs = path.chords, np.sqrt(path.stiffness)
     sizes = np.linalg.norm(chords, axis=1)
     pulls = np.diff(costs[:, None] * chords / np.maximum(sizes, TINY)[:, None], axis=0)
@@ -181,10 +180,10 @@ def _forces(path: Strand) -> Array:
 
 
 def outwards(around: Surroundings, band: Band) -> Array:
-    """(m - 2, 2): at corners, unit vectors across the way that lead off the obstacle; else 0."""
+    """(m - 2, 2), at corners unit vectors across the path, away from the obstacle; 0 elsewhere."""
     along = _directions(band.points)
-    way = along[1:] + along[:-1]
-    left = np.column_stack([-way[:, 1], way[:, 0]]) / np.maximum(np.hypot(*way.T), TINY)[:, None]
+    mean = along[1:] + along[:-1]
+    left = np.column_stack([-mean[:, 1], mean[:, 0]]) / np.maximum(np.hypot(*mean.T), TINY)[:, None]
     off = np.zeros_like(left)
     bent = band.bends[1:-1] != NONE
     corners = band.bends[1:-1][bent]
@@ -195,9 +194,9 @@ def outwards(around: Surroundings, band: Band) -> Array:
 def loosened(
     around: Surroundings, band: Band, path: Strand, releases: dict[int, int]
 ) -> Band | None:
-    """Without the contacts that pull at the path; None where there is none of them.
+    """The band without the contacts that pull at the path; None where there are none.
 
-    path : the band, lifted. releases : how often each corner was let go already; it is written to.
+    path : the band, lifted. releases : how often each corner was released before; it is updated.
     """
     force = _forces(path)
     pull = (force * outwards(around, band)).sum(axis=1)
@@ -223,7 +222,7 @@ def loosened(
 
 
 def _without_loops(band: Band) -> Band:
-    """Without what leads from a corner back to the same one, held by nothing in between."""
+    """The band without parts that lead from a corner back to it and are not held in between."""
     held = np.flatnonzero(band.is_held)
     again = (band.bends[held[1:]] == band.bends[held[:-1]]) & (band.bends[held[1:]] != NONE)
     if not again.any():
@@ -235,7 +234,7 @@ def _without_loops(band: Band) -> Band:
 
 
 def _slid_off(around: Surroundings, band: Band) -> Band:
-    """Points that slid beyond the end of their wall are free again."""
+    """The band with points free again that slid beyond the end of their wall."""
     touching = np.flatnonzero(band.walls[:, 0] != NONE)
     if len(touching) == 0:
         return band
@@ -251,7 +250,7 @@ def _slid_off(around: Surroundings, band: Band) -> Band:
 
 
 def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
-    """The band pulled taut: no move of its points that obstacles leave them shortens it."""
+    """The band pulled taut: no move that obstacles allow shortens it."""
     releases: dict[int, int] = {}
     path = None
     for _ in range(MOST_ROUNDS):

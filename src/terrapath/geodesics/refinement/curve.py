@@ -1,6 +1,6 @@
 """Smooth curves through points.
 
-They are those of SciPy's ``make_interp_spline``, whose import would take longer than a plan.
+They are the same as those of SciPy's ``make_interp_spline``, whose import takes longer than a plan.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...validation import Array
 
 @dataclass(frozen=True)
 class Curve:
-    """A B-spline of the share of the way.
+    """A B-spline curve in the plane, with a parameter from 0 to 1.
 
     knots : (m + degree + 1,), rising from 0 to 1. coefficients : (m, 2), map units.
     """
@@ -25,11 +25,11 @@ class Curve:
     knots: Array
     coefficients: Array
 
-    def __call__(self, shares: Array, derivative: int = 0) -> Array:
-        """The points (m, 2) at shares (m,) of the way, or a derivative there by the share."""
+    def __call__(self, parameters: Array, derivative: int = 0) -> Array:
+        """The points (m, 2) at parameters (m,), or a derivative there."""
         if derivative:
-            return self._slope()(shares, derivative - 1)
-        first, weights = _basis(self.knots, self.degree, shares)
+            return self._slope()(parameters, derivative - 1)
+        first, weights = _basis(self.knots, self.degree, parameters)
         nearby = self.coefficients.take(first[:, None] + np.arange(self.degree + 1), axis=0)
         return np.asarray(np.einsum("mk,mka->ma", weights, nearby))
 
@@ -39,26 +39,27 @@ class Curve:
         return Curve(k - 1, knots[1:-1], k * np.diff(self.coefficients, axis=0) / spans)
 
 
-def _basis(knots: Array, degree: int, shares: Array) -> tuple[NDArray[np.int64], Array]:
-    """The first of the B-splines that are not 0 at each share, and the values of all of them."""
-    first, weights = np.empty(len(shares), np.int64), np.empty((len(shares), degree + 1))
-    fill_basis(knots, degree, shares, first, weights)
+def _basis(knots: Array, degree: int, parameters: Array) -> tuple[NDArray[np.int64], Array]:
+    """The first of the B-splines that are not 0 at each parameter, and all their values."""
+    count = len(parameters)
+    first, weights = np.empty(count, np.int64), np.empty((count, degree + 1))
+    fill_basis(knots, degree, parameters, first, weights)
     return first, weights
 
 
 def spline_through(points: Array, degree: int) -> Curve:
-    """The curve through points (m, 2) at equal shares of the way.
+    """The curve through points (m, 2) at equal steps of its parameter.
 
-    degree : odd; of fewer points than it takes, as high as they let it be. Pieces join at the
-    points, but not at those beside the ends.
+    degree : odd; lower where there are too few points for it. The pieces of the spline join at the
+    points, except for those next to the ends.
     """
     pieces = len(points) - 1
     degree = min(degree, pieces)
-    shares = np.linspace(0.0, 1.0, pieces + 1)
+    parameters = np.linspace(0.0, 1.0, pieces + 1)
     beside = (degree + 1) // 2
-    inner = shares[beside : beside + pieces - degree]
+    inner = parameters[beside : beside + pieces - degree]
     knots = np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)])
-    first, weights = _basis(knots, degree, shares)
+    first, weights = _basis(knots, degree, parameters)
     rows, coefficients = np.zeros((len(points), 2 * degree + 1)), np.array(points)
     row = np.arange(len(points))[:, None]
     rows[row, degree + first[:, None] + np.arange(degree + 1) - row] = weights

@@ -11,25 +11,26 @@ from ...surface import Surface
 from ...validation import Array
 from .curve import spline_through
 
-# Largest derivative of the energy at the path found, times the path's length on the plane, as a
-# share of the energy: free of units.
+# At a minimum the derivative of the energy, times the path's length on the plane, is at most this
+# share of the energy. It has no unit.
 STATIONARY = 1e-9
-SETTLED = 1e-9  # largest move of Newton's method, as a share of a mean piece, at a minimum
-ROUNDING = 1e-15  # of the energy: whether a step saves less only rounding decides
+SETTLED = 1e-9  # at a minimum a step is at most this share of a mean piece
+ROUNDING = 1e-15  # of the energy; a step that saves less may save nothing but rounding
 MOST_STEPS = 200
 MOST_HALVINGS = 30
 
-# One step moves no point farther than this many features of the surface, or this share of the
-# path, whichever is more: the path is to settle where it lies, not behind the next hill.
+# A step moves no point farther than this many features of the surface or this share of the path,
+# whichever is more. So the path stays on its side of a hill.
 FARTHEST_FEATURES = 2.0
 FARTHEST_SHARE = 0.05
 
 
 class Lifted(NamedTuple):
-    """A polyline and what lies above it.
+    """A polyline, with what kernels need to know of the surface above it.
 
-    energy : pieces times the sum of squared chords, each times its squared cost. It is least
-    where the pieces are equally long and their sum, whose square it then is, is least.
+    strand : what kernels read and write. energy : the number of pieces times the sum of squared
+    chords, each times its squared cost. It is least where the pieces are equally long and the
+    polyline is shortest; then it is the square of the length.
     """
 
     strand: kernels.Strand
@@ -43,12 +44,12 @@ class Lifted(NamedTuple):
 
     @property
     def planar_length(self) -> float:
-        """Map units."""
+        """The length on the plane, map units."""
         return float(np.hypot(self.strand.chords[:, 0], self.strand.chords[:, 1]).sum())
 
 
 def lift(surface: Surface, points: Array) -> Lifted:
-    """Points (m, 2), map units, unchecked: off its edge a surface is continued."""
+    """The polyline through points (m, 2), map units; beyond its edge a surface is extrapolated."""
     m, layers = len(points), len(surface.layers)
     strand = kernels.Strand(
         points,
@@ -64,34 +65,34 @@ def lift(surface: Surface, points: Array) -> Lifted:
 
 
 class Step(NamedTuple):
-    """Where Newton's method would have the inner points go."""
+    """A step of Newton's method for the inner points of a polyline."""
 
     definite: bool  # is the second derivative of the energy positive definite?
     derivative: Array  # (m - 2, 2), of the energy, map units
-    move: Array  # (m - 2, 2), map units; a direction of negative curvature where it is not
+    move: Array  # (m - 2, 2), map units; where not definite, a direction of negative curvature
 
 
 def newton_step(strand: kernels.Strand, projectors: Array, curvature: float = 1.0) -> Step:
-    """The step that makes the pull on every inner point normal to the surface.
+    """The step after which the pull on every inner point is normal to the surface.
 
     projectors : (m - 2, 2, 2), onto the moves that each point is free to make.
-    curvature : 1 for Newton's step, 0 to leave out what layers and cost bend, which makes a
-    step that always leads down.
+    curvature : 1 for Newton's step; 0 leaves out the curvature of layers and cost, so that the
+    step always lowers the energy.
     """
     count = len(projectors)
-    room = kernels.Room(*np.empty((2, count, 2)), *np.empty((2, count, 2, 2)))
-    definite = kernels.newton_step(strand, projectors, curvature, room)
-    return Step(definite, 2.0 * (count + 1) * room.derivative, room.move)
+    space = kernels.Workspace(*np.empty((2, count, 2)), *np.empty((2, count, 2, 2)))
+    definite = kernels.newton_step(strand, projectors, curvature, space)
+    return Step(definite, 2.0 * (count + 1) * space.derivative, space.move)
 
 
 def _descent_step(path: Lifted, projectors: Array) -> Step:
-    """Newton's step; where the energy is not convex, one that leads down and off a saddle."""
+    """Newton's step; where the energy is not convex, a step that lowers it and leaves a saddle."""
     step = newton_step(path.strand, projectors)
     if not step.definite:
         plain = newton_step(path.strand, projectors, 0.0)
-        way = -1.0 if np.vdot(step.move, step.derivative) > 0.0 else 1.0
+        sign = -1.0 if np.vdot(step.move, step.derivative) > 0.0 else 1.0
         spacing = path.planar_length / (len(path.points) - 1)
-        move = plain.move + way * (spacing / _largest(step.move)) * step.move
+        move = plain.move + sign * (spacing / _largest(step.move)) * step.move
         step = Step(False, plain.derivative, move)
     return step
 
@@ -101,12 +102,12 @@ def _largest(values: Array) -> float:
 
 
 def farthest_move(surface: Surface, length: float) -> float:
-    """How far one step may move a point of a path of that length on the plane, map units."""
+    """How far a step may move a point, map units. length : of the path on the plane."""
     return max(FARTHEST_FEATURES * surface.resolution, FARTHEST_SHARE * length)
 
 
 def _is_minimum(step: Step, path: Lifted) -> bool:
-    """Is this one, to the accuracy that Newton's method is run to?"""
+    """Is the path at a minimum of the energy, within the tolerances above?"""
     if not step.definite:
         return False
     if _largest(step.derivative) * path.planar_length <= STATIONARY * path.energy:
@@ -117,10 +118,10 @@ def _is_minimum(step: Step, path: Lifted) -> bool:
 
 
 def lower(surface: Surface, path: Lifted, projectors: Array) -> Lifted | None:
-    """The path moved by the largest of the halved steps that lowers its energy, if any does.
+    """The path after a step that lowers its energy; None at a minimum.
 
-    There is none at a minimum. projectors : (m - 2, 2, 2), onto the moves that each inner
-    point is free to make.
+    The step is halved until it lowers the energy. projectors : (m - 2, 2, 2), onto the moves that
+    each inner point is free to make.
     """
     step = _descent_step(path, projectors)
     if _is_minimum(step, path):
@@ -133,16 +134,16 @@ def lower(surface: Surface, path: Lifted, projectors: Array) -> Lifted | None:
         tried = lift(surface, points)
         if tried.energy < path.energy:
             return tried
-    return None  # as low as rounding lets it be
+    return None  # rounding lets no step lower it
 
 
 def all_free(points: Array) -> Array:
-    """(m - 2, 2, 2), the projectors of points that nothing holds but their ends."""
+    """(m - 2, 2, 2), the projectors where all inner points may move freely."""
     return np.tile(np.eye(2), (len(points) - 2, 1, 1))
 
 
 def settle(surface: Surface, points: Array) -> Array:
-    """The path of least energy with as many points, near the given one, by Newton's method."""
+    """The path of least energy near points (m, 2), with as many points, by Newton's method."""
     path, projectors = lift(surface, points), all_free(points)
     for _ in range(MOST_STEPS):
         found = lower(surface, path, projectors)
@@ -153,15 +154,15 @@ def settle(surface: Surface, points: Array) -> Array:
 
 
 def resample(points: Array, pieces: int) -> Array:
-    """As many pieces, equal in the curve's parameter, of the smooth curve through the points."""
+    """``pieces`` + 1 points of the smooth curve through points, at equal steps of its parameter."""
     return spline_through(points, 3)(np.linspace(0.0, 1.0, pieces + 1))
 
 
 def shortest_polyline(surface: Surface, points: Array, pieces: tuple[int, ...]) -> Array:
     """The locally shortest polyline near the one given, (m, 2), map units.
 
-    pieces : of the path, from coarse to fine; each number starts from the path of the one
-    before, the first from the points.
+    pieces : numbers of pieces, from coarse to fine. The first stage starts from the points given,
+    each other one from the path of the stage before.
     """
     for count in pieces:
         finer = points if len(points) == count + 1 else resample(points, count)

@@ -1,10 +1,10 @@
 """From a polyline of least energy to the exact geodesic, and points along it.
 
-The vertices of the polyline of least energy are off the geodesic by the square of their
-spacing. A geodesic of constant speed is one whose acceleration in R^n is normal to the
-surface, but for what the slope of the cost makes of it; differences of fourth order measure
-that acceleration to the fourth power of the spacing, and the matrix of the polyline's Newton
-step serves to correct it.
+The error of the vertices of a polyline of least energy falls with the square of their spacing. On a
+geodesic of constant speed the acceleration in R^n is normal to the surface, apart from a part that
+the slope of the cost makes. Differences of fourth order measure that acceleration with an error
+that falls with the fourth power of the spacing. The matrix of Newton's step for the polyline then
+corrects the vertices.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ...validation import Array
 from .curve import Curve, spline_through
 from .newton import all_free, farthest_move, lift, newton_step
 
-FEWEST_PIECES = 7  # that the differences fit into
+FEWEST_PIECES = 7  # that the differences need
 MOST_CORRECTIONS = 12
-CORRECTED = 1e-10  # largest correction at which it ends, as a share of the path's length
+CORRECTED = 1e-10  # the largest correction of the last round, as a share of the path's length
 
-# Where the path is straight, points are still laid as densely as this share of the mean.
+# Where the path is straight, points are placed at this share of the mean density.
 LEAST_DENSITY = 0.1
 SAMPLES_PER_PIECE = 4
 MOST_POINTS = 8192
@@ -37,7 +37,7 @@ _SLOPE_BESIDE_END = np.array([-3.0, -10.0, 18.0, -6.0, 1.0, 0.0]) / 12.0
 def _differences(above: Array, central: Array, beside_end: Array, sign: float) -> Array:
     """Differences of fourth order at the inner points, (m, n) -> (m - 2, n).
 
-    sign : what turning the order of the points makes of them.
+    sign : 1 or -1, the factor on the differences when the order of the points is reversed.
     """
     found = np.empty((len(above) - 2, above.shape[1]))
     windows = (above[k : len(above) - 4 + k] for k in range(5))
@@ -48,7 +48,7 @@ def _differences(above: Array, central: Array, beside_end: Array, sign: float) -
 
 
 def _of_fourth_order(path: Strand) -> Strand:
-    """With pull and drift those of the curve through the points, by fourth-order differences."""
+    """The strand with the pull and the drift of the curve through its points."""
     above = np.hstack([path.points, path.jets[:, :, 0] * path.weights])
     second = _differences(above, _CENTRAL, _BESIDE_END, 1.0)
     first = _differences(above, _CENTRAL_SLOPE, _SLOPE_BESIDE_END, -1.0)
@@ -59,10 +59,10 @@ def _of_fourth_order(path: Strand) -> Strand:
 
 
 def correct(surface: Surface, points: Array) -> Array | None:
-    """Vertices (m, 2) of a geodesic near those of a polyline of least energy.
+    """The vertices (m, 2) of a polyline of least energy, moved onto the geodesic.
 
-    Their error falls with the fourth power of their spacing. None where the surface is too
-    rough between the vertices for that.
+    Their error falls with the fourth power of their spacing. None where the surface is too rough
+    between the vertices for that.
     """
     if len(points) <= FEWEST_PIECES:
         return None
@@ -83,12 +83,12 @@ def correct(surface: Surface, points: Array) -> Array | None:
 
 
 def curve_through(points: Array) -> Curve:
-    """The smooth curve through vertices (m, 2), as a function of the share of the way."""
+    """The smooth curve through vertices (m, 2), with a parameter from 0 to 1."""
     return spline_through(points, 5 if len(points) > 6 else 3)
 
 
 def _measured(surface: Surface, points: Array, v: Array) -> tuple[Array, Array]:
-    """|v|_h and det h (m,) at points (m, 2), by the kernel that refinement needs in any case."""
+    """|v|_h and det h, both (m,), at points (m, 2)."""
     path = lift(surface, points).strand
     slopes = path.jets[:, :, 1:3] * path.weights[:, None]
     h = path.costs[:, 0, None, None] * (np.eye(2) + np.einsum("mka,mkb->mab", slopes, slopes))
@@ -96,12 +96,13 @@ def _measured(surface: Surface, points: Array, v: Array) -> tuple[Array, Array]:
     return np.sqrt(np.einsum("ma,mab,mb->m", v, h, v)), determinant
 
 
-def laid_shares(surface: Surface, curve: Curve, pieces: int, tolerance: float) -> Array:
-    """Shares of the way at which the points of a polyline are to be laid, both ends included.
+def placed_parameters(surface: Surface, curve: Curve, pieces: int, tolerance: float) -> Array:
+    """The curve's parameters at the points of a polyline, both ends included.
 
-    The polyline is longer than the geodesic by ``tolerance`` of its length: a piece of planar
-    length d, where the curve turns by c a unit of length, by det h / h(u, u)^(3/2) c^2 d^3 / 24,
-    u being its direction. pieces : of the curve, which are sampled to find out.
+    tolerance : by which the polyline is longer than the geodesic, relative. Let a piece have the
+    planar length d and the direction u, and let the curve turn by c per unit of length there.
+    The piece is too long by det h / h(u, u)^(3/2) c^2 d^3 / 24. pieces : of the curve; each is
+    sampled.
     """
     t = np.linspace(0.0, 1.0, SAMPLES_PER_PIECE * pieces + 1)
     v, bend = curve(t, 1), curve(t, 2)

@@ -1,4 +1,4 @@
-"""The taut path among obstacles, from the first pull to the points that are laid."""
+"""The taut path among obstacles, from the first pull to the final points."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from ...surface import Surface
 from ...validation import Array
 from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
 from .newton import settle
-from .smooth import correct, curve_through, laid_shares
+from .smooth import correct, curve_through, placed_parameters
 from .walls import Surroundings, surroundings
 
-# Between a path and what it touches, as a share of the region's side.
+# The distance between a path and what it touches, as a share of the region's side.
 CLEARANCE = 1e-8
-# Where the path given is nearer to something than that, a smaller one is tried.
+# Where the path given is nearer to an obstacle, a tenth of the clearance is tried, and so on.
 CLEARANCE_ATTEMPTS = 4
 
-# Points that are nearer to one another, as a share of the region's side, are one.
+# Points that are nearer to one another than this, as a share of the region's side, are merged.
 REPEATED = 1e-10
 
-# Of the polygons that stand for discs: from coarse to fine, by fours.
+# Sides of the polygons that replace discs; they grow by a factor of four.
 FEWEST_SIDES, MOST_SIDES = 64, 4096
 
-# Pieces of the polyline a feature of the surface, stage by stage.
+# Pieces of the polyline for each feature of the surface, stage by stage.
 PIECES_PER_FEATURE = (2.0, 8.0)
 MOST_PIECES = 4096
 FEWEST_PIECES = 8  # of the path, and of each smooth stretch
-# A piece shorter than this share of a feature is as good as straight.
+# A piece shorter than this share of a feature is taken as straight.
 STRAIGHT = 3e-3
 SMOOTHING_ROUNDS = 10
 
 
 def taut_paths(problem: Problem, points: Array, tolerance: float) -> Iterator[Array]:
-    """Polylines (m, 2) that are ever closer to the taut path that the given one is pulled to."""
+    """Polylines (m, 2) from the one given towards the taut path; each is closer to it."""
     surface, space = problem.surface, problem.free_space
     around = _around(space, points)
     if around is None:
@@ -58,11 +58,11 @@ def taut_paths(problem: Problem, points: Array, tolerance: float) -> Iterator[Ar
         yield _tidied(problem, band.points)
     band = _smoothed(surface, around, band)
     yield _tidied(problem, band.points)
-    yield _tidied(problem, _laid(surface, around, band, tolerance))
+    yield _tidied(problem, _placed(surface, around, band, tolerance))
 
 
 def _tidied(problem: Problem, points: Array) -> Array:
-    """Without repeated points, and those that are off the bounds by rounding put on their edge."""
+    """The points without repeated ones; those just outside the bounds are put on the edge."""
     apart = np.hypot(*np.diff(points, axis=0).T) > REPEATED * problem.bounds.side
     kept = np.concatenate([points[:1], points[1:-1][apart[:-1]], points[-1:]])
     x0, y0, x1, y1 = problem.bounds
@@ -75,7 +75,7 @@ def _tidied(problem: Problem, points: Array) -> Array:
 
 
 def _around(space: FreeSpace, points: Array) -> Surroundings | None:
-    """What is around a path, at the largest clearance that the path keeps."""
+    """The surroundings of a path, with the largest clearance that the path keeps."""
     for attempt in range(CLEARANCE_ATTEMPTS):
         clearance = CLEARANCE * space.bounds.side * 0.1**attempt
         sides = np.array([_sides_clear_of(points, c, clearance) for c in space.circles], int)
@@ -88,7 +88,7 @@ def _around(space: FreeSpace, points: Array) -> Surroundings | None:
 
 
 def _sides_clear_of(points: Array, circle: Circle, clearance: float) -> int:
-    """Sides of the coarsest polygon around a disc that a polyline stays out of."""
+    """How many sides the coarsest polygon around a disc has that a polyline stays out of."""
     centre, radius = np.array([circle.x1, circle.x2]), circle.radius
     ahead, offset = np.diff(points, axis=0), centre - points[:-1]
     squared = np.maximum((ahead**2).sum(axis=1), 1e-300)
@@ -103,9 +103,10 @@ def _sides_clear_of(points: Array, circle: Circle, clearance: float) -> int:
 def _with_finer_discs(
     space: FreeSpace, around: Surroundings, band: Band
 ) -> tuple[Surroundings, Band] | None:
-    """With four times the sides around the discs that the path bends round, if any can have more.
+    """Surroundings with four times the sides around the discs that the path bends round.
 
-    A coarse corner is cut into four, which lie behind it; the path is pulled onto them.
+    A coarse corner is replaced by four that lie behind it, and the path is pulled onto them. None
+    where no disc that the path touches can have more sides.
     """
     band = _pruned(around, band)
     touched = np.unique(around.discs[band.bends])
@@ -134,16 +135,16 @@ def _with_finer_discs(
 def _is_left(around: Surroundings, band: Band) -> npt.NDArray[np.bool_]:
     """(m,): do the obstacles that the path bends round lie to its left?"""
     left = np.zeros(len(band.points), bool)
-    off, way = outwards(around, band), band.points[2:] - band.points[:-2]
-    left[1:-1] = way[:, 0] * off[:, 1] - way[:, 1] * off[:, 0] < 0.0
+    off, along = outwards(around, band), band.points[2:] - band.points[:-2]
+    left[1:-1] = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0] < 0.0
     return left
 
 
 def _pulled_back(around: Surroundings, band: Band, groups: Indices) -> Band:
-    """With the points in groups (m,) moved to the corners that they are said to be at.
+    """The band with points moved to the corners that they should be at.
 
-    Every other group moves at a time, so that one that something is in the way of does not
-    keep the others from moving. Its points are free then.
+    groups : (m,), the group that each point belongs to, or NONE. Every other group moves at a time,
+    so that a group that is stopped does not keep the others from moving. Its points are then free.
     """
     for parity in (0, 1):
         moving = (groups != NONE) & (np.cumsum(np.diff(groups, prepend=NONE) != 0) % 2 == parity)
@@ -156,9 +157,9 @@ def _pulled_back(around: Surroundings, band: Band, groups: Indices) -> Band:
 
 
 def _pruned(around: Surroundings, band: Band) -> Band:
-    """Without the points between two neighbouring corners of a disc's polygon.
+    """The band without the points between neighbouring corners of a disc's polygon.
 
-    Its sides are so short that the path between them is as good as straight.
+    Its sides are so short that the path between them is taken as straight.
     """
     held = np.flatnonzero(band.is_held)
     discs = around.discs[band.bends[held]]
@@ -175,9 +176,9 @@ def _pruned(around: Surroundings, band: Band) -> Band:
 
 
 def _stretches(surface: Surface, around: Surroundings, band: Band) -> Iterator[tuple[Band, bool]]:
-    """The band in parts that share their ends, and whether each is a geodesic to be smoothed.
+    """The band in parts that share their ends, and whether each one is to be a geodesic.
 
-    The others are runs along walls and around discs, straight from point to point.
+    The other parts run along walls and around discs; they are straight from point to point.
     """
     stops = np.flatnonzero(band.is_held | (band.walls[:, 0] != NONE))
     first, last = stops[:-1], stops[1:]
@@ -196,17 +197,17 @@ def _stretches(surface: Surface, around: Surroundings, band: Band) -> Iterator[t
 
 
 def _joined(parts: list[Band]) -> Band:
-    """Parts that share their ends, as one band."""
+    """One band from parts that share their ends."""
     kept = [parts[0], *(part.chosen(slice(1, None)) for part in parts[1:])]
     names = ("points", "bends", "walls")
     return Band(*(np.concatenate([getattr(part, name) for part in kept]) for name in names))
 
 
 def _smoothed(surface: Surface, around: Surroundings, band: Band) -> Band:
-    """With every stretch between contacts a geodesic to the fourth power of its spacing.
+    """The band with each part between contacts moved onto a geodesic.
 
-    Where such a stretch meets a corner that the polyline passed by, the path is bent round
-    that, too, and pulled taut again.
+    The error falls with the fourth power of the spacing of points. Where such a part meets another
+    corner, the path is bent round that too, and pulled taut again.
     """
     for _ in range(SMOOTHING_ROUNDS):
         parts = [
@@ -221,7 +222,7 @@ def _smoothed(surface: Surface, around: Surroundings, band: Band) -> Band:
 
 
 def _smoothed_part(surface: Surface, around: Surroundings, part: Band) -> Band:
-    """A stretch between contacts, moved onto the geodesic between its ends."""
+    """A part between contacts, moved onto the geodesic between its ends."""
     pieces = len(part.points) - 1
     if math.isinf(surface.resolution):
         target = np.linspace(part.points[0], part.points[-1], pieces + 1)
@@ -234,16 +235,16 @@ def _smoothed_part(surface: Surface, around: Surroundings, part: Band) -> Band:
     return advanced(around, part, settled if corrected is None else corrected)[0]
 
 
-def _laid(surface: Surface, around: Surroundings, band: Band, tolerance: float) -> Array:
-    """Points (m, 2) along the geodesics between contacts."""
-    laid = [band.points[:1]]
+def _placed(surface: Surface, around: Surroundings, band: Band, tolerance: float) -> Array:
+    """The final points (m, 2), along the geodesics between contacts."""
+    placed = [band.points[:1]]
     for part, is_geodesic in _stretches(surface, around, band):
-        points = _laid_part(surface, around, part, tolerance) if is_geodesic else part.points
-        laid.append(points[1:])
-    return np.concatenate(laid)
+        points = _placed_part(surface, around, part, tolerance) if is_geodesic else part.points
+        placed.append(points[1:])
+    return np.concatenate(placed)
 
 
-def _laid_part(surface: Surface, around: Surroundings, part: Band, tolerance: float) -> Array:
+def _placed_part(surface: Surface, around: Surroundings, part: Band, tolerance: float) -> Array:
     pieces = len(part.points) - 1
     if pieces < 2:
         return part.points
@@ -251,9 +252,9 @@ def _laid_part(surface: Surface, around: Surroundings, part: Band, tolerance: fl
         return part.points[[0, -1]]
     curve = curve_through(part.points)
     at_vertices = np.linspace(0.0, 1.0, pieces + 1)
-    shares = np.union1d(at_vertices, laid_shares(surface, curve, pieces, tolerance))
-    before = np.column_stack([np.interp(shares, at_vertices, axis) for axis in part.points.T])
-    target = curve(shares)
+    parameters = np.union1d(at_vertices, placed_parameters(surface, curve, pieces, tolerance))
+    before = np.column_stack([np.interp(parameters, at_vertices, axis) for axis in part.points.T])
+    target = curve(parameters)
     target[[0, -1]] = part.points[[0, -1]]
     band = Band.free(before)
     band.bends[[0, -1]] = part.bends[[0, -1]]

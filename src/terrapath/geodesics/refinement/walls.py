@@ -1,8 +1,7 @@
 """The outline of free space: straight walls, and the corners that a taut path bends round.
 
-Obstacles are closed sets, so a path keeps clear of them by a hair: every outline is moved
-outwards by a tiny clearance, and a taut path runs along the moved outline. Discs become
-polygons that hold them, with as many sides as are asked for.
+Obstacles are closed sets, so a path must not touch them. Every outline is moved outwards by a tiny
+clearance, and a taut path runs along the moved outline. Discs are replaced by polygons around them.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
@@ -23,11 +21,11 @@ from ...surface import Mask
 from ...surface.bounds import Bounds
 from ...validation import Array
 
-# Walls stand behind the places where a path touches them by this share of the clearance.
+# Walls stand behind the points where a path touches them by this share of the clearance.
 SLACK = 0.01
-# ... and end before the corners' places by this share.
+# At a corner walls are extended by this share of what would make them meet.
 SHORTENED = 0.98
-# A mask's cells are widened by free space itself; this share of a cell is beyond that.
+# Free space itself widens the cells of masks; this share of a cell is a little more than that.
 CELL_CLEARANCE = 3e-7
 # A corner turns by more than this, radians.
 LEAST_TURN = 1e-9
@@ -37,8 +35,9 @@ LEAST_TURN = 1e-9
 class Outline:
     """Walls and corners, not yet indexed.
 
-    edges : (e, 4) and normals : (e, 2), towards free ground. clearance : (e,), of each wall.
-    corners : (c, 2), where a path bends. tips : (c, 2), what its segments may not meet.
+    edges : (e, 4), the walls. normals : (e, 2), of length 1, towards free ground. clearance : (e,),
+    of each wall. corners : (c, 2), where a path bends. tips : (c, 2), points just behind the
+    corners, which no segment may touch. All in map units.
     """
 
     edges: Array
@@ -49,7 +48,7 @@ class Outline:
 
     @classmethod
     def joined(cls, parts: Sequence[Outline]) -> Outline:
-        """All walls and corners of several outlines, in their order."""
+        """One outline with all walls and corners of several, in their order."""
         names = ("edges", "normals", "clearance", "corners", "tips")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -58,13 +57,14 @@ class Outline:
 class Surroundings:
     """All that a path can run into.
 
-    corners : (c, 2), where a path bends. clearance : (e,), of each wall. discs : (c + 1,), the disc
-    that a corner belongs to, -1 for none, as the last entry says for no corner at all;
-    wall_discs : (e + 1,), likewise for walls; and sides : (discs,), of the polygon around each.
+    walls : for moving paths. space : the same walls, for testing segments. corners : (c, 2), where
+    a path bends. clearance : (e,), of each wall. discs : (c + 1,), the disc that each corner
+    belongs to, or -1; the last entry is -1, for the index NONE. wall_discs : (e + 1,), the same for
+    walls. sides : (discs,), of the polygon around each disc.
     """
 
-    walls: Any
-    space: Any
+    walls: kernels.Walls
+    space: grids.Space
     corners: Array
     clearance: Array
     discs: Indices
@@ -75,8 +75,8 @@ class Surroundings:
 def _ring(points: Array, clearance: float) -> Outline:
     """The outline of a ring (n, 2) with free ground to its right.
 
-    Where it turns by more than a right angle the corner is cut off, so that a spike's corner
-    does not lie far from its tip.
+    A corner that turns by more than a right angle is cut off. Otherwise the corner of a spike would
+    lie far from its tip.
     """
     ahead = np.roll(points, -1, axis=0) - points
     points = points[(ahead != 0.0).any(axis=1)]
@@ -110,7 +110,7 @@ def _ring(points: Array, clearance: float) -> Outline:
 
 
 def _rings(geometry: BaseGeometry) -> list[Array]:
-    """Rings (n, 2), not closed, with free ground to their right."""
+    """The rings (n, 2) of a geometry, not closed, with free ground to their right."""
     if isinstance(geometry, shapely.Polygon):
         turned = shapely.orient_polygons(geometry)
         return [shapely.get_coordinates(ring)[:-1] for ring in (turned.exterior, *turned.interiors)]
@@ -119,7 +119,7 @@ def _rings(geometry: BaseGeometry) -> list[Array]:
 
 
 def _disc(x: float, y: float, radius: float, sides: int) -> Array:
-    """The regular polygon around a disc; with four times the sides it lies in this one."""
+    """The regular polygon around a disc. That with four times the sides lies inside this one."""
     angles = (np.arange(sides) + 0.5) * (2.0 * math.pi / sides)
     reach = radius / math.cos(math.pi / sides)
     return np.column_stack([x + reach * np.cos(angles), y + reach * np.sin(angles)])
@@ -144,13 +144,13 @@ def _mask(mask: Mask, clearance: float) -> Outline:
         (blocked[:-1, 1:-1], blocked[1:, 1:-1], (0, 1), (0.0, 1.0)),
         (blocked[1:-1, :-1], blocked[1:-1, 1:], (1, 0), (1.0, 0.0)),
     ):
-        for walls, way in ((below & ~above, 1.0), (above & ~below, -1.0)):
+        for walls, sign in ((below & ~above, 1.0), (above & ~below, -1.0)):
             j, i = np.nonzero(walls)
             first, last = (j, i), (j + step[0], i + step[1])
             a, b = (np.column_stack([node_x[i], node_y[j]]) for j, i in (first, last))
             along = (b - a) / np.hypot(*(b - a).T)[:, None]
             longer = SHORTENED * clearance * along
-            out = way * np.array(normal)
+            out = sign * np.array(normal)
             a = a + (1.0 - SLACK) * clearance * out - is_corner[first][:, None] * longer
             b = b + (1.0 - SLACK) * clearance * out + is_corner[last][:, None] * longer
             edges.append(np.hstack([a, b]))
@@ -166,7 +166,7 @@ def _mask(mask: Mask, clearance: float) -> Outline:
 
 
 def _bounds(bounds: Bounds, clearance: float) -> Outline:
-    """The edge of the bounds, which a path may run along exactly."""
+    """The outline of the bounds; a path may run exactly along their edge."""
     x0, y0, x1, y1 = bounds
     slack = SLACK * clearance
     corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
@@ -177,7 +177,7 @@ def _bounds(bounds: Bounds, clearance: float) -> Outline:
 
 
 def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surroundings:
-    """Everything around a path. sides : (discs,), of the polygon around each disc."""
+    """All walls and corners of a free space. sides : (discs,), of the polygon around each disc."""
     parts = [_bounds(space.bounds, clearance)]
     for geometry in space.geometries:
         parts += [_ring(ring, clearance) for ring in _rings(geometry)]
@@ -198,8 +198,8 @@ def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surround
     )
 
 
-def _indexed(bounds: Bounds, outline: Outline) -> tuple[Any, Any]:
-    """Walls for sweeps, and the same walls as a space that segments are tested in."""
+def _indexed(bounds: Bounds, outline: Outline) -> tuple[kernels.Walls, grids.Space]:
+    """Walls for moving paths, and the same walls as a space for testing segments."""
     grid = index_grid(bounds, len(outline.edges))
     edges = np.ascontiguousarray(outline.edges)
     tips = np.ascontiguousarray(outline.tips)
@@ -209,15 +209,14 @@ def _indexed(bounds: Bounds, outline: Outline) -> tuple[Any, Any]:
     walls = kernels.Walls(
         grid, edges, normals, edge_first, edge_ids, tips, corner_first, corner_ids
     )
-    none, nobody = np.zeros(len(edge_first), np.int64), np.empty(0, np.int64)
     space = grids.Space(
         grid,
         edges,
         edge_first,
         edge_ids,
         np.empty((0, 3)),
-        none,
-        nobody,
+        np.zeros(len(edge_first), np.int64),
+        np.empty(0, np.int64),
         np.empty((0, 4)),
         np.empty((0, 3), np.int64),
         np.empty(0, np.uint8),

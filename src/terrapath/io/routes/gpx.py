@@ -49,7 +49,9 @@ def _description(solution: Solution) -> str:
     surface = solution.problem.surface
     text = f"length {solution.length:.6g} {surface.unit}".rstrip()
     if solution.lower_bound is not None and solution.gap is not None:
-        text += f", {solution.bounded} than {solution.lower_bound:.6g}, gap {solution.gap:.3%}"
+        text += (
+            f", {solution.bound_in_words} than {solution.lower_bound:.6g}, gap {solution.gap:.3%}"
+        )
     if height_metres(surface) is None:
         text += "; without elevations: the unit of the heights is not known"
     return f"{text}; {solution.planner}, seed {solution.seed}"

@@ -84,7 +84,7 @@ def _corridor(solution: Solution) -> dict[str, Any]:
         "bound_holds": "in the corridor",
         "corridor_half_width": corridor.half_width,
         "corridor_decimate": corridor.decimate,
-        "coarse_length": corridor.coarse.length,
+        "coarse_length": corridor.coarse_length,
         "lower_bound_everywhere": corridor.least_length(solution),
     }
 
