@@ -78,10 +78,10 @@ def test_finishing_adds_to_a_solution_and_changes_nothing_else(raw):
 
 
 def test_what_is_done_is_not_done_again(raw, monkeypatch):
-    finished = finish(raw, refine=True, bound=True)
+    done = finish(raw, refine=True, bound=True)
     monkeypatch.setattr(finished, "refine", None)
     monkeypatch.setattr(finished, "lower_bound", None)
-    assert finish(finished, refine=True, bound=True, target_gap=finished.gap) is finished
+    assert finish(done, refine=True, bound=True, target_gap=done.gap) is done
 
 
 def test_a_target_gap_is_worked_on_after_a_bound_that_misses_it(raw):
