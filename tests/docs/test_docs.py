@@ -27,8 +27,8 @@ INDENTED = re.compile(r"(?:^    .+\n)+", re.MULTILINE)
 PRINTING = re.compile(r"^\s*print\(.*\)\s+# ([^;]*)")
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
-# They have tests of their own: test_benchmarks.py, test_reproduce.py and test_startup.py.
-LONG = {"benchmark", "reproduce", "warmup"}
+# They have tests of their own: test_reproduce.py and test_startup.py.
+LONG = {"reproduce", "warmup"}
 
 # The reader's own maps, made here: the CRS, west and north, columns and rows of 100 m, bands.
 MAPS = {
