@@ -81,6 +81,7 @@ def runner(tmp_path):
 # The report
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_whole_report_and_measures_nothing_twice(tmp_path, tiny, monkeypatch):
     options = ["--quick", "--quiet", "--output", str(tmp_path)]
     assert run([*ALONE, *options], app) == 0
@@ -208,6 +209,7 @@ def test_bounds_get_better_and_their_times_grow(runner):
     assert [target.what for target in missed] == ["one-peak: gap of 1 %", "one-peak: gap of 0.1 %"]
 
 
+@pytest.mark.slow
 def test_fast_marching_is_near_the_truth_beside_its_peer(runner, monkeypatch):
     pytest.importorskip("skfmm")
     monkeypatch.setattr(marching.MarchTrial, "measure", here)

@@ -284,6 +284,7 @@ def test_the_objective_in_numpy_is_line_r(problem):
     assert measure(*a, *b) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", grounds(), ids=["peaks", "spline"])
 def test_line_r_in_cpp_is_ours(problem):
     if programs.EDGES_LOOP.problem is not None:
@@ -295,6 +296,7 @@ def test_line_r_in_cpp_is_ours(problem):
     assert reading.wall > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["six-peaks", "three-peaks-discs"])
 def test_ompl_in_cpp_believes_what_our_edges_say(scene):
     if programs.OMPL_PLANNERS.problem is not None:
@@ -324,6 +326,7 @@ def test_ompl_in_cpp_believes_what_our_edges_say(scene):
     assert curves.true_length_of(problem, path) > 15.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["rrt-star", "bit-star"])
 def test_ompl_through_python_goes_around_obstacles(planner):
     if OMPL_PYTHON.version is None:
@@ -462,6 +465,7 @@ def test_edges_are_random_but_the_same_and_inside():
     np.testing.assert_allclose(fitted, exact, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_edges_are_timed_beside_the_loop(runner):
     data = edges.run_edges(TINY, runner)
     assert set(data.found) == {"spline", "peaks"}

@@ -12,7 +12,7 @@ import certificate_oracles as oracles
 import planner_oracles
 import terrapath as tp
 from certificate_cases import BOUNDS, ROUNDING, SIDE, certified, random_surface
-from common import FLAT, REGION
+from common import FLAT, REGION, mostly_slow
 from layouts import LAYOUTS, star
 from oracles import great_circle
 from terrapath.geodesics.rays import trace_ray
@@ -109,7 +109,7 @@ def test_no_bound_is_above_the_straight_line_on_tilted_planes(batch):
     check_gaps(gaps, 2e-9)
 
 
-@pytest.mark.parametrize("batch", range(8))
+@pytest.mark.parametrize("batch", mostly_slow(range(8), quick=2))
 def test_no_bound_is_above_a_geodesic(batch):
     # Any geodesic is a path, and a short one is the shortest.
     gaps = []
@@ -162,7 +162,7 @@ def problem_among_obstacles(random):
                 continue
 
 
-@pytest.mark.parametrize("batch", range(10))
+@pytest.mark.parametrize("batch", mostly_slow(range(10), quick=2))
 def test_no_bound_is_above_any_path_among_obstacles(batch):
     gaps, found = [], 0
     for random in numbered(AMONG_OBSTACLES, 13, 10, batch):

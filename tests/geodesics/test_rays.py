@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from scipy.optimize import brentq
 
 import terrapath as tp
-from common import numbers
+from common import mostly_slow, numbers
 from geodesic_cases import (
     ONE_PEAK,
     RADIUS,
@@ -484,7 +484,7 @@ def random_layers(seed):
     return layers, tuple(5.0 - reach), tuple(5.0 + reach)
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", mostly_slow(range(50), quick=10))
 def test_the_shortest_geodesic_of_a_random_surface_is_as_long_as_solve_bvp_says(seed):
     layers, start, goal = random_layers(seed)
     surface = peaks_surface(layers)

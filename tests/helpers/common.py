@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
 import terrapath as tp
@@ -17,6 +18,12 @@ REGION = (-1.0, -1.0, 11.0, 11.0)
 
 def numbers(low, high):
     return st.floats(low, high, allow_subnormal=False)
+
+
+def mostly_slow(parameters, quick=1):
+    """Parameters of a test: the first few are tried always, the rest with the slow tests."""
+    each = list(parameters)
+    return each[:quick] + [pytest.param(one, marks=pytest.mark.slow) for one in each[quick:]]
 
 
 def points_in(bounds, count, seed=0):

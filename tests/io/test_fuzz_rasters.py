@@ -11,6 +11,8 @@ import pytest
 
 import fuzz_rasters
 
+pytestmark = pytest.mark.slow
+
 MUTATIONS = 300  # of each file
 
 

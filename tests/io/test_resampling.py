@@ -17,6 +17,7 @@ from common import one_line
 from rasters import HEIGHTS, NORTH_UP, UTM, centres, write
 from terrains import TRUTH, WGS84, height_at, terrain
 from terrapath.cli.main import run
+from terrapath.surface.bounds import Bounds
 from terrapath.surface.grid import Grid
 from terrapath.surface.resampling import resample
 
@@ -117,7 +118,7 @@ def test_a_margin_around_a_window_is_read_too(tmp_path, crs, corner, cell):
     ends = np.array([window[:2], window[2:]])
     inside = part.georeference.from_map(ends)
     (west, south), (east, north) = inside.min(axis=0) - margin, inside.max(axis=0) + margin
-    assert part.bounds.encloses(tp.validation.Bounds(west, south, east, north))
+    assert part.bounds.encloses(Bounds(west, south, east, north))
     side = np.ptp(inside, axis=0).max()
     assert max(part.bounds.width, part.bounds.height) < 2.0 * (side + margin)
 
@@ -138,7 +139,7 @@ def test_within_reads_a_window_with_a_margin(tmp_path):
     whole = tp.read_surface(path)
     window = (500_200.0, 3_999_500.0, 500_400.0, 3_999_700.0)
     part = tp.read_surface(path, within=window, layers={"same": path})
-    assert part.bounds.encloses(tp.validation.Bounds(*window))
+    assert part.bounds.encloses(Bounds(*window))
     assert part.bounds.width < 400.0
     points = np.random.default_rng(6).uniform(window[:2], window[2:], (100, 2))
     np.testing.assert_allclose(part.values(points)[:, 0], whole.values(points)[:, 0], atol=1e-4)

@@ -344,6 +344,7 @@ def everything(tmp_path_factory):
     return settings, {name: experiments.EXPERIMENTS[name](settings, runner) for name in names}
 
 
+@pytest.mark.slow
 def test_paths_without_resistance_are_shorter_until_it_is_counted(everything):
     data = everything[1]
     found = data["comparative"]
@@ -353,6 +354,7 @@ def test_paths_without_resistance_are_shorter_until_it_is_counted(everything):
     assert plain.most_resistance > full.most_resistance
 
 
+@pytest.mark.slow
 def test_no_path_is_shorter_than_the_true_length(everything):
     settings, data = everything
     for runs in data["repeat"]:
@@ -360,6 +362,7 @@ def test_no_path_is_shorter_than_the_true_length(everything):
         assert min(runs.lengths) > runs.truth.true_length
 
 
+@pytest.mark.slow
 def test_the_shortest_path_of_repeat_4d_is_outside_the_papers_sector(everything):
     data = everything[1]
     truth = data["repeat"][1].truth
@@ -367,6 +370,7 @@ def test_the_shortest_path_of_repeat_4d_is_outside_the_papers_sector(everything)
     assert truth.geodesics[0].angle > np.pi / 2.0
 
 
+@pytest.mark.slow
 def test_the_sweep_is_the_derivative_of_the_end(everything):
     data = everything[1]
     six = data["sensitivity"][1]
@@ -377,6 +381,7 @@ def test_the_sweep_is_the_derivative_of_the_end(everything):
         assert np.linalg.norm(moved) / 2e-6 == pytest.approx(movement, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["comparative", "repeat", "sensitivity"])
 def test_pictures_and_sections_are_made(everything, tmp_path, name):
     settings, data = everything

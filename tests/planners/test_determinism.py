@@ -108,6 +108,7 @@ def test_another_process_finds_the_same_bits(here):
     assert statistics["loaded"] + statistics["compiled"] > 0
 
 
+@pytest.mark.slow
 def test_kernels_compiled_afresh_find_the_same_bits_as_kernels_from_the_cache(here, cold_and_warm):
     (cold, cold_statistics), (warm, _) = cold_and_warm
     assert cold_statistics["compiled"] > 0
@@ -115,6 +116,7 @@ def test_kernels_compiled_afresh_find_the_same_bits_as_kernels_from_the_cache(he
     assert warm == here
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing(cold_and_warm):
     (_, cold), (_, warm) = cold_and_warm
     assert cold["compiled"] > 0

@@ -12,6 +12,7 @@ import pytest
 import shapely
 
 import terrapath as tp
+from common import mostly_slow
 from oracles import geodesic_by_collocation, geodesic_by_hamilton, peaks_jets
 from terrapath.cli.main import run
 from terrapath.geodesics.rays import is_bracket, trace_ray
@@ -52,7 +53,7 @@ def same_curve(a, b):
 # The geodesics of the fan
 
 
-@EVERY_SCENE
+@pytest.mark.parametrize("scene", mostly_slow(SCENES, quick=3))
 def test_every_geodesic_ends_at_the_goal_and_is_a_geodesic(scene):
     geodesics = fan_of(scene).geodesics
     assert geodesics
@@ -113,7 +114,7 @@ def test_the_lengths_are_those_of_the_reference():
     assert 0.0 < repeat[1].length / repeat[0].length - 1.0 < 0.0008
 
 
-@EVERY_SCENE
+@pytest.mark.parametrize("scene", mostly_slow(SCENES))
 def test_more_directions_never_lose_the_shortest(scene):
     shortest = [fan_of(scene, n).geodesics[0].length for n in (200, 400, 600)]
     assert (np.diff(shortest) <= 1e-9).all()

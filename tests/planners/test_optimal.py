@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 import terrapath as tp
-from common import FLAT, REGION
+from common import FLAT, REGION, mostly_slow
 from terrapath.errors import UnfinishedWarning
 from terrapath.geodesics import alternatives
 from terrapath.problem import scenes
@@ -55,7 +55,7 @@ def shortest_of_many_starts(problem):
     return best
 
 
-@pytest.mark.parametrize("batch", range(SURFACES // BATCH))
+@pytest.mark.parametrize("batch", mostly_slow(range(SURFACES // BATCH), quick=3))
 def test_the_best_route_is_no_longer_than_from_many_starts(batch):
     for seed in range(batch * BATCH, (batch + 1) * BATCH):
         problem = random_problem(seed)

@@ -195,7 +195,9 @@ def answers_cleanly(file, content, capsys):
 
 
 @pytest.mark.parametrize("mutate", [mutated_bytes, mutated_tokens])
-@pytest.mark.parametrize(("text", "count"), [(SCENE, 800), (MAP, 300)])
+@pytest.mark.parametrize(
+    ("text", "count"), [pytest.param(SCENE, 800, marks=pytest.mark.slow), (MAP, 300)]
+)
 def test_damaged_scenarios_are_planned_or_refused_in_one_line(text, count, mutate, folder, capsys):
     file = folder / "scenario.toml"
     assert answers_cleanly(file, text.encode(), capsys)  # undamaged

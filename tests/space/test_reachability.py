@@ -251,6 +251,7 @@ def random_ends(obstacles, random):
     return [point for point in points if space.blocker(point) is None]
 
 
+@pytest.mark.slow
 def test_random_obstacles_separate_what_flood_fill_finds_apart():
     random = np.random.default_rng(11)
     apart = joined = 0
