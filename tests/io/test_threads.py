@@ -296,7 +296,7 @@ PLANNERS = {
     "rrt": {"samples": 300, "step": 120.0, "seed": 2},
     "a-star": {"spacing": 20.0},
     "fast-marching": {"spacing": 20.0},
-    "optimal": {"spacing": 20.0},
+    "optimal": {"spacing": 20.0, "target_gap": 0.05},
 }
 
 
