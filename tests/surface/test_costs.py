@@ -11,7 +11,6 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
 import terrapath as tp
-from common import mostly_slow
 from terrapath.distance.source import near_distance
 from terrapath.errors import CertificateError, InputError
 from terrapath.geodesics import refinement
@@ -242,7 +241,8 @@ def test_the_distance_field_is_hyperbolic():
     assert error.max() < 1e-2
 
 
-@pytest.mark.parametrize("factor", mostly_slow([0.01, 7.0]))
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.01, 7.0])
 def test_a_constant_cost_scales_every_length(factor):
     axis = np.linspace(0.0, SIDE, 33)
     ground = np.sin(axis)[:, None] * np.cos(1.3 * axis)
