@@ -9,7 +9,7 @@ import numpy as np
 
 from terrapath._kernels.surface.surfaces import Peaks, Spline
 from terrapath.errors import InputError
-from terrapath.planners.tree_search import FEATURES_PER_PANEL
+from terrapath.planners.rrt_star import FEATURES_PER_PANEL
 from terrapath.problem import Problem
 from terrapath.space.free_space import Circle
 from terrapath.surface.bounds import Bounds, Mask

@@ -365,13 +365,13 @@ def test_ctrl_c_exits_with_130_and_writes_the_best_so_far(tmp_path):
     output = tmp_path / "best.json"
     program = (
         "import signal, sys, threading, time\n"
-        "from terrapath.planners import tree_search\n"
+        "from terrapath.planners import rrt_star\n"
         "from terrapath.cli.main import run\n"
-        "seen = tree_search._reason_to_stop\n"
+        "seen = rrt_star._reason_to_stop\n"
         "def interrupt(search, callback):\n"
         "    if search.samples >= 2048: signal.raise_signal(signal.SIGINT)\n"
         "    return seen(search, callback)\n"
-        "tree_search._reason_to_stop = interrupt\n"
+        "rrt_star._reason_to_stop = interrupt\n"
         f"sys.exit(run(['plan', 'six-peaks', '--samples', '100000', '--output', {str(output)!r}]))"
     )
     done = subprocess.run(

@@ -11,12 +11,12 @@ from numba import config
 
 from kernel_copies import copy_machinery
 from processes import in_another_process
-from terrapath._kernels import cache, compiler
+from terrapath._kernels import cache, compiler, second_core
 from terrapath._support.extras import EXTRA_OF
 from terrapath.cli import console
 from terrapath.cli.main import run
 from terrapath.errors import InputError
-from terrapath.planners import second_core, warmup
+from terrapath.planners import warmup
 from terrapath.surface import Surface
 
 # What is said

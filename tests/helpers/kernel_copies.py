@@ -6,7 +6,6 @@ from pathlib import Path
 
 from terrapath import errors
 from terrapath._kernels import compiler
-from terrapath._support import telling
 
 KERNELS = Path(compiler.__file__).parent
 MACHINERY = ("cache", "compiler", "dispatch", "fallback", "linking", "signatures")
@@ -20,8 +19,6 @@ def copy_machinery(folder, **modules):
     kernels = folder / "copied" / "_kernels"
     kernels.mkdir(parents=True)
     shutil.copy(errors.__file__, kernels.parent / "errors.py")
-    (kernels.parent / "_support").mkdir()
-    shutil.copy(telling.__file__, kernels.parent / "_support" / "telling.py")
     for name in MACHINERY:
         shutil.copy(KERNELS / f"{name}.py", kernels)
     for name, source in modules.items():

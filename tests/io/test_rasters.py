@@ -14,7 +14,7 @@ import terrapath as tp
 from common import REAL_MAPS, one_line
 from oracles import is_blocked
 from rasters import HEIGHTS, NORTH_UP, UTM, centres, write
-from terrapath.io.sources import LayerSource
+from terrapath.io.maps import LayerSource
 from terrapath.surface.georeference import Georeference
 from terrapath.surface.raster import Raster
 

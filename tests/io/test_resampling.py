@@ -18,7 +18,7 @@ from rasters import HEIGHTS, NORTH_UP, UTM, centres, write
 from terrains import TRUTH, WGS84, height_at, terrain
 from terrapath.cli.main import run
 from terrapath.surface.bounds import Bounds
-from terrapath.surface.grid import Grid
+from terrapath.surface.raster import Grid
 from terrapath.surface.resampling import resample
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")

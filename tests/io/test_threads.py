@@ -17,7 +17,7 @@ import xarray
 from affine import Affine
 
 import terrapath as tp
-from terrapath._support.telling import collecting
+from terrapath.errors import collecting
 from terrapath.surface.georeference import Georeference
 
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")

@@ -11,7 +11,7 @@ import shapely
 import planner_oracles as oracles
 import terrapath as tp
 from terrapath._kernels.planners import rrt_star as kernels, sampling, tree as trees
-from terrapath.planners import tree_search
+from terrapath.planners import rrt_star
 from terrapath.problem import scenes
 
 LAYERS = {
@@ -52,7 +52,7 @@ def assert_same_tree(name, polygons, samples, seed, *, step=1.0, radius_factor=1
         step,
         radius_factor,
         goal_bias=0.05,
-        panel=tree_search.FEATURES_PER_PANEL * problem.surface.resolution,
+        panel=rrt_star.FEATURES_PER_PANEL * problem.surface.resolution,
         blocked=lambda a, b: shapely.intersects(shapely.LineString([a, b]), polygons).any(),
     )
     for draw in np.random.Generator(np.random.PCG64(seed)).random((samples, 3)):
@@ -127,9 +127,9 @@ def test_pruning_changes_no_bit_on_a_spline_surface():
 
 def grown(problem, planner, draws):
     """A tree with some samples, and the kernels' settings."""
-    tree = tree_search._allocate(planner.samples, problem.surface)
-    settings = tree_search._kernel_options(problem, planner._tree_options())
-    tree_search._prepare(problem, tree, settings)
+    tree = rrt_star._allocate(planner.samples, problem.surface)
+    settings = rrt_star._kernel_options(problem, planner._tree_options())
+    rrt_star._prepare(problem, tree, settings)
     kernels.grow(problem.surface.data, problem.free_space.data, tree, settings, draws)
     return tree, settings
 
@@ -226,7 +226,7 @@ def test_an_informed_tree_skips_parents_where_that_is_shorter(informed, obstacle
     tree, settings = grown(problem, planner, np.empty((0, 3)))
     for x, y in CHAIN:
         assert kernels.extend(flat.data, problem.free_space.data, tree, settings, x, y)
-    found = tree_search._search_tree(tree)
+    found = rrt_star._search_tree(tree)
     np.testing.assert_array_equal(found.points[1:], CHAIN)
     np.testing.assert_array_equal(found.parents, parents)
     ways = found.points - found.points[found.parents]
@@ -270,7 +270,7 @@ def test_every_edge_considered_is_pruned_or_measured(metric):
 def test_costs_add_up_line_r_along_the_tree_and_never_less_than_the_chord(panel, metric):
     problem = scene("six-peaks", OBSTACLES)
     tree = tp.RRTStar(samples=700, panel=panel, metric=metric, step=2.0).solve(problem).tree
-    pieces = panel or tree_search.FEATURES_PER_PANEL * problem.surface.resolution
+    pieces = panel or rrt_star.FEATURES_PER_PANEL * problem.surface.resolution
     children, edges = edges_of(tree)
     layers = LAYERS["six-peaks"]
     for child, edge in zip(children, edges, strict=True):
@@ -326,7 +326,7 @@ def test_informed_sampling_adds_no_vertex_that_the_chord_rules_out():
     problem = scene("six-peaks")
     solution = tp.RRTStar(samples=6000, seed=2).solve(problem)
     first = solution.history.best_cost[0]
-    early = tp.RRTStar(samples=tree_search.CHUNK, seed=2).solve(problem)
+    early = tp.RRTStar(samples=rrt_star.CHUNK, seed=2).solve(problem)
     assert math.isfinite(first)
     later = solution.tree.points[len(early.tree.points) :]
     layers = LAYERS["six-peaks"]

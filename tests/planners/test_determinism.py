@@ -13,7 +13,7 @@ from planner_oracles import TREE_PLANNERS
 from processes import in_another_process
 from reruns import TREES, problems, trees
 from terrapath._kernels import cache
-from terrapath.planners import tree_search
+from terrapath.planners import rrt_star
 from terrapath.problem import scenes
 
 
@@ -65,7 +65,7 @@ def test_no_global_random_state_is_read_or_changed():
 def test_the_chunk_size_changes_no_bit(name, chunk, monkeypatch):
     problem = problems()["peaks"]
     expected = tp.plan(problem, name, samples=1300, seed=9)
-    monkeypatch.setattr(tree_search, "CHUNK", chunk)
+    monkeypatch.setattr(rrt_star, "CHUNK", chunk)
     found = tp.plan(problem, name, samples=1300, seed=9)
     assert_same_bits(expected, found)
     assert len(found.history.samples) == -(-1300 // chunk)
@@ -75,7 +75,7 @@ def test_the_chunk_size_changes_no_bit(name, chunk, monkeypatch):
 def test_the_chunk_size_does_not_change_the_path_of_rrt(chunk, monkeypatch):
     problem = problems()["peaks"]
     expected = tp.RRT(samples=5000, seed=9).solve(problem)
-    monkeypatch.setattr(tree_search, "CHUNK", chunk)
+    monkeypatch.setattr(rrt_star, "CHUNK", chunk)
     found = tp.RRT(samples=5000, seed=9).solve(problem)
     np.testing.assert_array_equal(expected.path.points, found.path.points)
     assert expected.cost == found.cost
@@ -88,7 +88,7 @@ def test_a_longer_run_begins_as_the_shorter_one(options, monkeypatch):
     problem = scenes.load("six-peaks")
     for seed in range(6):
         for samples in (300, 700):
-            monkeypatch.setattr(tree_search, "CHUNK", samples)
+            monkeypatch.setattr(rrt_star, "CHUNK", samples)
             short = tp.RRTStar(samples=samples, seed=seed, **options).solve(problem)
             long = tp.RRTStar(samples=8 * samples, seed=seed, **options).solve(
                 problem, callback=lambda progress, n=samples: progress.samples >= n

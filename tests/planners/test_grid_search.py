@@ -17,7 +17,7 @@ import planner_oracles as oracles
 import terrapath as tp
 from terrapath._kernels.planners import grid_search as kernels
 from terrapath.planners import grid_search, make_planner
-from terrapath.planners.tree_search import FEATURES_PER_PANEL
+from terrapath.planners.rrt_star import FEATURES_PER_PANEL
 from terrapath.problem import scenes
 from terrapath.space.lattice import Lattice
 

@@ -15,7 +15,7 @@ import shapely
 
 import terrapath as tp
 from planner_oracles import TREE_PLANNERS
-from terrapath.planners import PLANNERS, Progress, make_planner, tree_search
+from terrapath.planners import PLANNERS, Progress, make_planner, rrt_star
 from terrapath.problem import scenes
 
 EVERY_PLANNER = pytest.mark.parametrize("name", TREE_PLANNERS)
@@ -119,7 +119,7 @@ def test_history_and_counters_are_consistent(name, enclosed, problem):
 
 
 def test_the_best_cost_never_rises_from_one_sample_to_the_next(problem, monkeypatch):
-    monkeypatch.setattr(tree_search, "CHUNK", 1)
+    monkeypatch.setattr(rrt_star, "CHUNK", 1)
     for name in ("rrt-star-r", "rrt-star"):
         history = tp.plan(problem, name, samples=1500, seed=2).history
         np.testing.assert_array_equal(history.samples, np.arange(1, 1501))
@@ -134,7 +134,7 @@ def test_the_best_cost_never_rises_from_one_sample_to_the_next(problem, monkeypa
 
 
 def test_rrt_stops_at_its_first_path(problem, monkeypatch):
-    monkeypatch.setattr(tree_search, "CHUNK", 1)
+    monkeypatch.setattr(rrt_star, "CHUNK", 1)
     solution = tp.RRT(seed=3).solve(problem)
     assert solution.samples < 10_000
     assert np.isfinite(solution.history.best_cost).sum() == 1
@@ -179,9 +179,9 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(name, problem):
         assert solution.stopped_by in ("time limit", "first path")
         return
     assert solution.stopped_by == "time limit"
-    assert solution.samples == tree_search.CHUNK
+    assert solution.samples == rrt_star.CHUNK
     assert solution.status is tp.Status.SOLVED
-    same = tp.plan(problem, name, samples=tree_search.CHUNK, step=3.0)
+    same = tp.plan(problem, name, samples=rrt_star.CHUNK, step=3.0)
     assert same_tree(solution, same)
     np.testing.assert_array_equal(solution.path.points[[0, -1]], [problem.start, problem.goal])
 
@@ -190,8 +190,8 @@ def test_rrt_ends_as_soon_after_the_first_path_as_it_says(problem):
     solution = tp.plan(problem, "rrt", samples=MANY)
     assert solution.stopped_by == "first path"
     assert np.isinf(solution.history.best_cost[:-1]).all()
-    assert (np.diff(solution.history.samples) <= tree_search.CHUNK).all()
-    assert f"within {tree_search.CHUNK} samples of the first path" in tp.RRT.__doc__
+    assert (np.diff(solution.history.samples) <= rrt_star.CHUNK).all()
+    assert f"within {rrt_star.CHUNK} samples of the first path" in tp.RRT.__doc__
 
 
 @pytest.mark.parametrize("name", ["fast-marching", "optimal"])
@@ -255,7 +255,7 @@ def test_a_callback_sees_the_progress(name, problem):
 def test_a_callback_stops_the_search_by_returning_true(name, problem):
     solution = tp.plan(problem, name, samples=MANY, callback=lambda progress: True, step=3.0)
     assert solution.stopped_by == "callback"
-    assert solution.samples == tree_search.CHUNK
+    assert solution.samples == rrt_star.CHUNK
     assert solution.status is tp.Status.SOLVED
     blind = {} if name == "rrt" else {"informed": False}
     unfinished = tp.plan(
@@ -295,12 +295,12 @@ def assert_interrupted(solution, problem):
 @pytest.mark.parametrize("name", ["rrt-star-r", "rrt-star"])
 def test_ctrl_c_in_a_callback_gives_the_best_path_so_far(name, problem):
     def interrupt(progress):
-        if progress.samples >= 3 * tree_search.CHUNK:
+        if progress.samples >= 3 * rrt_star.CHUNK:
             raise KeyboardInterrupt
 
     solution = tp.plan(problem, name, samples=MANY, callback=interrupt)
     assert_interrupted(solution, problem)
-    assert solution.samples == 3 * tree_search.CHUNK
+    assert solution.samples == 3 * rrt_star.CHUNK
 
 
 def test_ctrl_c_before_the_first_path_gives_no_path(problem):
@@ -325,17 +325,17 @@ def test_a_signal_raised_while_planning_gives_the_best_path_so_far(problem):
 
 def test_a_signal_that_arrives_inside_a_kernel_gives_the_best_path_so_far(problem, monkeypatch):
     # Python handles a signal when the kernel returns: the samples are in the tree by then.
-    grow, drawn = tree_search.kernels.grow, []
+    grow, drawn = rrt_star.kernels.grow, []
 
     def interrupted_grow(*arguments):
         grow(*arguments)
         drawn.append(len(arguments[-1]))
-        if sum(drawn) == 4 * tree_search.CHUNK:
+        if sum(drawn) == 4 * rrt_star.CHUNK:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(tree_search.kernels, "grow", interrupted_grow)
+    monkeypatch.setattr(rrt_star.kernels, "grow", interrupted_grow)
     solution = tp.RRTStar(samples=MANY, seed=4).solve(problem)
-    assert solution.samples == 4 * tree_search.CHUNK
+    assert solution.samples == 4 * rrt_star.CHUNK
     assert_interrupted(solution, problem)
 
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from terrapath._kernels import cache
+from terrapath._kernels import cache, second_core
+from terrapath._kernels.second_core import SecondCore
 from terrapath.cli import compiling
 from terrapath.cli.main import run
-from terrapath.planners import second_core, warmup
+from terrapath.planners import warmup
 from terrapath.planners.base import PROVING, REFINING, Progress
-from terrapath.planners.second_core import SecondCore
 
 NOTHING = "nothing at all"  # no rehearsal: the process ends by itself
 
@@ -190,7 +190,7 @@ def test_a_plan_waits_for_it_before_the_bound(arguments, waits, recorder, capsys
 
 START = """
 import os, sys, time
-from terrapath import second_core
+from terrapath._kernels import second_core
 second_core.cores = lambda: 2
 with second_core.SecondCore("lower bounds on peaks") as second:
     second.start()

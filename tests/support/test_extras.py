@@ -88,7 +88,7 @@ IN_DEGREES = ("dem.tif", *ENDS)
 @pytest.mark.parametrize(
     ("package", "named", "arguments"),
     [
-        ("geopandas", "route.gpkg", (*IN_DEGREES, "--output", "route.gpkg")),
+        ("pyogrio", "route.gpkg", (*IN_DEGREES, "--output", "route.gpkg")),
         ("pyogrio", "route.gpkg", (*IN_DEGREES, "--output", "route.gpkg")),
         ("gpxpy", "route.gpx", (*IN_DEGREES, "--output", "route.gpx")),
         ("rosbags", "route.bag2", (*IN_DEGREES, "--output", "route.bag2")),

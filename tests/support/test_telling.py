@@ -12,8 +12,7 @@ import pytest
 import shapely
 
 import terrapath as tp
-from terrapath._support.telling import collecting, silence, tell, told_to
-from terrapath.errors import TerrapathWarning, UnfinishedWarning
+from terrapath.errors import TerrapathWarning, UnfinishedWarning, collecting, silence, tell, told_to
 
 BOW_TIE = {"type": "Polygon", "coordinates": [[[1, 1], [5, 5], [5, 1], [1, 5], [1, 1]]]}
 

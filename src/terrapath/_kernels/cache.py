@@ -23,8 +23,7 @@ from typing import Any
 
 from numba import __version__ as numba_version, config
 
-from .._support.telling import tell
-from ..errors import KernelWarning
+from ..errors import KernelWarning, tell
 from .fallback import is_plain
 
 # Tells of each kernel that is compiled, for it was not found in the cache.

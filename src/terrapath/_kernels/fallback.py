@@ -13,8 +13,7 @@ from contextlib import contextmanager
 
 from numba import __version__ as numba_version
 
-from .._support.telling import tell
-from ..errors import KernelWarning
+from ..errors import KernelWarning, tell
 
 # The first version of Numba that linking is tested with, and the first that it is not tested
 # with any more. pyproject.toml declares the same, and a test holds them together.

@@ -8,8 +8,6 @@ from ..errors import MissingExtraError
 
 # Each package, and the extra of Terrapath that installs it.
 EXTRA_OF = {
-    "geopandas": "vector",
-    "pandas": "vector",
     "pyogrio": "vector",
     "xarray": "xarray",
     "h5netcdf": "xarray",

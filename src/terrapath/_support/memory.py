@@ -1,8 +1,9 @@
-"""How much memory this process has had at most."""
+"""Memory: how much was in use at most, and blocks of large arrays, so that it is little."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -32,3 +33,13 @@ def forget_peak() -> None:
     """Let the peak start anew from here, where the system can; compiling had one of its own."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+
+
+BLOCK = 2**20  # values that are worked on at once
+
+
+def blocks(count: int, width: int) -> Iterator[slice]:
+    """Slices of ``count`` lines, each of ``width`` values, that hold a block together."""
+    size = max(1, BLOCK // max(width, 1))
+    for start in range(0, count, size):
+        yield slice(start, min(start + size, count))

@@ -10,9 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
-from .._support.telling import told_to
 from .._support.watching import Watch, watch_nothing
-from ..errors import TerrapathWarning
+from ..errors import TerrapathWarning, told_to
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars, TaskID

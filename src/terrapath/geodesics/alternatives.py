@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import shapely
 
-from .._support.telling import tell_unfinished
 from ..distance.field import DistanceField, Medium, march_from
+from ..errors import tell_unfinished
 from ..problem import Path, Problem
 from ..space.lattice import Lattice
 from ..validation import Array, require_count, require_positive

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from pyproj import CRS
 
+from .._support.memory import blocks
 from ..errors import MapError
-from ..surface.blocks import blocks
-from ..surface.grid import Grid
+from ..surface.raster import Grid
 from ..surface.resampling import require_overlap, resample
 from ..validation import Array
 from .bands import Band, Part, View

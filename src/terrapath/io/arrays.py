@@ -13,7 +13,7 @@ from rasterio import Affine
 
 from ..errors import InputError, MapError
 from ..surface.georeference import parse_crs
-from ..surface.grid import Grid
+from ..surface.raster import Grid
 from ..validation import Array, as_array
 from .bands import Band
 from .rasters import HEIGHT_NAMES, reading, with_crs

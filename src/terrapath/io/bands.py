@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._support.memory import BLOCK
 from ..errors import MapError
-from ..surface.blocks import BLOCK
 from ..surface.bounds import Bounds
-from ..surface.grid import Grid
 from ..surface.layers import Kind
+from ..surface.raster import Grid
 from ..validation import Array
 
 MARGIN = 8  # cells around a window: what lies beyond moves the spline by 1e-4 of itself

@@ -14,10 +14,9 @@ from pyproj import CRS
 from rasterio import Affine
 
 from .._support.extras import require_packages
-from .._support.telling import silence
-from ..errors import MapError, TerrapathError
+from ..errors import MapError, TerrapathError, silence
 from ..surface.georeference import parse_crs
-from ..surface.grid import Grid
+from ..surface.raster import Grid
 from ..validation import Array
 from .bands import Band
 

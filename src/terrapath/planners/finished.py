@@ -7,9 +7,9 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .._support.telling import tell_unfinished
 from ..certificates.certificate import Certificate
 from ..certificates.search import lower_bound
+from ..errors import tell_unfinished
 from ..geodesics.refinement import refine
 from ..problem import Problem, Solution, Status
 from ..validation import require_bool, require_positive

@@ -16,7 +16,7 @@ from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, require_count, require_positive
 from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit
-from .tree_search import FEATURES_PER_PANEL
+from .rrt_star import FEATURES_PER_PANEL
 
 # Vertices settled between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 4096

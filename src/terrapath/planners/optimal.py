@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from .._support.telling import tell_unfinished
 from ..distance.field import DistanceField, Medium, march_from
+from ..errors import tell_unfinished
 from ..geodesics.alternatives import routes_of_fields, shortest
 from ..problem import Path, Problem, Solution, Status
 from ..validation import require_count, require_positive

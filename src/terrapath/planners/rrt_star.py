@@ -1,12 +1,21 @@
-"""RRT*-R, and the original RRT* as its baseline."""
+"""RRT*-R: the search by a growing tree, and its planner."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Literal
 
-from ..problem import Problem, Solution
+import numpy as np
+
+from .._kernels.planners import rrt_star as kernels, tree as trees
+from .._kernels.planners.buckets import Buckets
+from ..problem import History, Path, Problem, SearchTree, Solution, Status
+from ..surface import Surface
 from ..validation import (
+    Array,
     require_bool,
     require_choice,
     require_count,
@@ -14,8 +23,252 @@ from ..validation import (
     require_positive,
     require_seed,
 )
-from .base import Callback, least_limit
-from .tree_search import TreeOptions, search_tree
+from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit
+
+# Samples between two looks at the clock, the callback and Ctrl-C.
+CHUNK = 512
+
+# The first samples keep the order in which they were drawn: the tree is still so small that
+# another order would not help the processor's cache.
+UNORDERED = 2048
+
+# One application of Line-R measures a piece that is at most this many features of the surface long.
+FEATURES_PER_PANEL = 4.0
+
+# The default step is this share of the side of a square as large as the bounds: 1.0 in the
+# paper's region of 12 x 12.
+STEPS_PER_SIDE = 12.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TreeOptions:
+    """The options of a tree planner; see ``RRTStar``."""
+
+    planner: str  # its name
+    samples: int  # at most this many
+    step: float | None  # map units, None for the default
+    radius_factor: float  # 0 for a tree that is never rewired
+    goal_bias: float
+    seed: int
+    riemannian: bool  # edges are measured by Line-R, not by the chord
+    prune: bool
+    informed: bool
+    panel: float | None = None  # map units, None for the default
+    time_limit: float | None = None  # seconds
+    target_length: float = 0.0  # map units; infinite to stop at the first path
+
+
+def default_step(problem: Problem) -> float:
+    """A step that suits the region, map units."""
+    return problem.bounds.side / STEPS_PER_SIDE
+
+
+def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
+    bounds = problem.bounds
+    # Karaman and Frazzoli (2011), theorem 38 at d = 2; the kernel multiplies by the root of
+    # the area that is searched, which is at least that of the free space in it.
+    least = 2.0 * math.sqrt(1.5 / math.pi)
+    panel = options.panel or FEATURES_PER_PANEL * problem.surface.resolution
+    return trees.Options(
+        *bounds,
+        *problem.start,
+        *problem.goal,
+        step=float(options.step or default_step(problem)),
+        radius=float(options.radius_factor * least),
+        goal_bias=float(options.goal_bias),
+        panel=float(panel),
+        riemannian=options.riemannian,
+        prune=options.prune,
+        informed=options.informed,
+    )
+
+
+def _allocate(samples: int, surface: Surface) -> trees.Tree:
+    size = samples + 2  # the start, and the goal that may join with the last sample
+    most = size // 2 + 64  # buckets
+    return trees.Tree(
+        places=np.empty((size, trees.LIFTED + len(surface.layers))),
+        vertices=np.empty(size, trees.TENSOR),
+        links=np.empty(size, trees.LINK),
+        counters=np.zeros(trees.COUNTERS, np.int64),
+        buckets=Buckets(
+            first=np.empty(most + 1, np.int32),
+            head=np.empty(most, np.int32),
+            next=np.empty(size, np.int32),
+            frame=np.zeros(3),
+            shape=np.zeros(2, np.int64),
+        ),
+        floor=surface.least_cost,
+        near=np.empty(size, trees.CANDIDATE),
+        queue=np.empty(size, np.int32),
+    )
+
+
+@dataclass
+class _Search:
+    """A running search: the tree, the clock and the history."""
+
+    problem: Problem
+    options: TreeOptions
+    settings: trees.Options
+    tree: trees.Tree
+    started: float = field(default_factory=time.perf_counter)
+    rows: list[tuple[int, float, float]] = field(default_factory=list)
+
+    @property
+    def seconds(self) -> float:
+        return time.perf_counter() - self.started
+
+    @property
+    def goal(self) -> int:
+        return int(self.tree.counters[trees.GOAL])
+
+    @property
+    def best_cost(self) -> float:
+        return float(self.tree.places[self.goal, trees.COST]) if self.goal >= 0 else math.inf
+
+    @property
+    def samples(self) -> int:
+        return int(self.tree.counters[trees.SAMPLES])
+
+    def note(self) -> Progress:
+        """Add the progress to the history and return it."""
+        progress = Progress(self.samples, self.options.samples, self.seconds, self.best_cost)
+        self.rows.append((progress.samples, progress.seconds, progress.best_cost))
+        return progress
+
+    def grow(self, draws: Array) -> None:
+        kernels.grow(
+            self.problem.surface.data, self.problem.free_space.data, self.tree, self.settings, draws
+        )
+
+
+def _prepare(problem: Problem, tree: trees.Tree, settings: trees.Options) -> None:
+    """Plant the tree; so the kernels are loaded, or compiled, before the clock starts."""
+    surface, space = problem.surface.data, problem.free_space.data
+    kernels.grow(surface, space, tree, settings, np.empty((0, 3)))
+
+
+def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
+    """Why the search should end now; empty where it should not."""
+    options = search.options
+    progress = search.note()
+    if callback is not None and callback(progress):
+        return "callback"
+    if math.isfinite(progress.best_cost) and progress.best_cost <= options.target_length:
+        return "first path" if math.isinf(options.target_length) else "target length"
+    if options.time_limit is not None and progress.seconds >= options.time_limit:
+        return "time limit"
+    if progress.samples >= options.samples:
+        return "samples"
+    return ""
+
+
+def _side_by_side(draws: Array) -> Array:
+    """Sort draws (m, 3) so that each one lies near the one before.
+
+    Their last two numbers are a point in a square; the order is row by row, to and fro.
+    """
+    row = np.floor(draws[:, 2] * math.isqrt(len(draws)))
+    column = np.where(row % 2 == 0, draws[:, 1], 1.0 - draws[:, 1])
+    return draws[np.argsort(row + column)]
+
+
+def _chunks(seed: int, samples: int) -> Iterator[Array]:
+    """The uniform numbers (m, 3) that samples are drawn with, chunk by chunk.
+
+    They are drawn in batches; each is a quarter of all those before. Within a batch the order is
+    free, so samples that need the same vertices follow one another, while these are in the
+    processor's cache. A batch is always drawn whole. So a run with fewer samples grows the
+    beginning of the tree that a run with more samples grows.
+    """
+    random = np.random.Generator(np.random.PCG64(seed))
+    batch = random.random((min(UNORDERED, samples), 3))
+    drawn = 0
+    while True:
+        used = batch[: samples - drawn]
+        yield from (used[first : first + CHUNK] for first in range(0, len(used), CHUNK))
+        drawn += len(batch)
+        if drawn >= samples:
+            return
+        batch = _side_by_side(random.random((drawn // 4, 3)))
+
+
+def _run(search: _Search, callback: Callback | None) -> str:
+    """Grow the tree until there is a reason to stop, and return it."""
+    reason = ""
+    try:
+        for draws in _chunks(search.options.seed, search.options.samples):
+            search.grow(draws)
+            if reason := _reason_to_stop(search, callback):
+                break
+    except KeyboardInterrupt:
+        search.note()  # what the kernel had done when the signal was seen
+        reason = INTERRUPT
+    return reason
+
+
+def _path(problem: Problem, tree: trees.Tree) -> Path | None:
+    vertex = int(tree.counters[trees.GOAL])
+    if vertex < 0:
+        return None
+    visited, parents = [], tree.links["parent"]
+    while vertex >= 0:
+        visited.append(vertex)
+        vertex = int(parents[vertex])
+    return problem.path(tree.places[visited[::-1], : trees.COST])
+
+
+def _search_tree(tree: trees.Tree) -> SearchTree:
+    """The vertices in the order in which they were added."""
+    count = int(tree.counters[trees.VERTICES])
+    ages, parents = tree.links["age"][:count], tree.links["parent"][:count]
+    by_age = np.argsort(ages)
+    parents = ages[parents[by_age]]
+    parents[0] = -1  # the start came first
+    points, costs = tree.places[by_age, : trees.COST], tree.places[by_age, trees.COST]
+    return SearchTree(points, parents, costs)
+
+
+def _counters(tree: trees.Tree) -> dict[str, int]:
+    places = {
+        "vertices": trees.VERTICES,
+        "edges considered": trees.CONSIDERED,
+        "edges pruned": trees.PRUNED,
+        "edges integrated": trees.INTEGRATED,
+        "edges tested for obstacles": trees.CHECKED,
+        "edges rewired": trees.REWIRED,
+    }
+    return {name: int(tree.counters[place]) for name, place in places.items()}
+
+
+def search_tree(problem: Problem, options: TreeOptions, callback: Callback | None) -> Solution:
+    """Grow a tree from the start until an option's limit is met or the callback stops it."""
+    answer = answer_without_search(problem, options.planner, options.seed)
+    if answer is not None:
+        return answer
+    tree = _allocate(options.samples, problem.surface)
+    settings = _kernel_options(problem, options)
+    _prepare(problem, tree, settings)
+    search = _Search(problem, options, settings, tree)
+    stopped_by = _run(search, callback)
+    seconds = search.seconds
+    path = _path(problem, tree)
+    status = Status.NOT_FOUND if path is None else Status.SOLVED
+    return Solution(
+        problem=problem,
+        planner=options.planner,
+        status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
+        path=path,
+        cost=None if path is None else search.best_cost,
+        seconds=seconds,
+        samples=search.samples,
+        seed=options.seed,
+        stopped_by=stopped_by,
+        history=History(*np.array(search.rows, np.float64).reshape(-1, 3).T),
+        tree=_search_tree(tree),
+        counters=_counters(tree),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

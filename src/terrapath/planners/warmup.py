@@ -14,12 +14,12 @@ import numpy as np
 import shapely
 
 from .._kernels import cache, compiler
+from .._kernels.second_core import SecondCore, rehearsal_name, serve_first_core
 from .._support.files import written_whole
-from .._support.telling import told_to
 from .._support.watching import Watch, watch_nothing
 from ..certificates.search import lower_bound
 from ..distance.field import distance_field
-from ..errors import InputError, MapError
+from ..errors import InputError, MapError, told_to
 from ..geodesics import christoffel_symbols, gaussian_curvature
 from ..geodesics.alternatives import alternatives
 from ..geodesics.refinement import refine
@@ -28,7 +28,6 @@ from ..space.free_space import Circle
 from ..surface import Mask, Surface
 from ..surface.metric import chord, line_r
 from .registry import plan
-from .second_core import SecondCore, rehearsal_name, serve_first_core
 
 # What was compiled for which kernels; it lies beside them.
 LIST_FILE = "terrapath-warm.json"

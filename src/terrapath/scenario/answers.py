@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from .._support.telling import collecting
-from ..errors import InputError, TerrapathWarning
-from ..planners.base import Callback
+from ..errors import InputError, TerrapathWarning, collecting
+from ..planners.base import PROVING, Callback, Progress
 from .option import Point
 from .question import Itinerary, Question, asked
 from .scenario import Scenario
 
 if TYPE_CHECKING:
+    from .._kernels.second_core import SecondCore
     from ..certificates.certificate import Certificate
     from ..distance.field import DistanceField
     from ..planners.corridor import Part
@@ -215,11 +215,13 @@ class _Run:
 
     def whole(self) -> tuple[Solution, tuple[GoalAnswer, ...]]:
         """Plan on all of the map: one route, or one to each goal that may be the nearest."""
-        from ..planners.tours import nearest, plan_goals, plan_tour
-
         itinerary = self._itinerary()
         problem, via, goals = itinerary.problem, itinerary.via, itinerary.goals
         with self._watched(problem) as watch:
+            if len(goals) == 1 and not via:
+                return self.planner.solve(problem, callback=watch), ()
+            from ..planners.tours import nearest, plan_goals, plan_tour
+
             if len(goals) == 1:
                 return plan_tour(problem, self.planner, via, callback=watch), ()
             every = self.question.scenario.route.all_goals
@@ -260,11 +262,22 @@ class _Run:
         if not (self.planner.bound or self.planner.target_gap is not None):
             yield watch
             return
-        from ..planners.second_core import bound_compiled_beside
+        from .._kernels.second_core import SecondCore, rehearsal_name
 
         kind = "spline" if surface is None else type(surface.data).__name__.lower()
-        with bound_compiled_beside(kind, watch) as joined:
-            yield joined
+        with SecondCore(rehearsal_name("lower bounds", kind)) as second:
+            yield _waiting(second, watch)
+
+
+def _waiting(second: SecondCore, watch: Callback | None) -> Callback:
+    """A watcher that waits for the second core when the lower bound is begun."""
+
+    def see(progress: Progress) -> bool:
+        if progress.stage == PROVING:
+            second.wait()
+        return watch is not None and bool(watch(progress))
+
+    return see
 
 
 def _with_unit(watch: Callback, unit: str) -> Callback:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .._support.telling import tell
-from ..errors import InputError, MapError, UnfinishedWarning
+from ..errors import InputError, MapError, UnfinishedWarning, tell
 from .sections import OutputSection
 
 if TYPE_CHECKING:

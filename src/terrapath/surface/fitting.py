@@ -11,9 +11,9 @@ import numpy as np
 
 from .._kernels.surface.surfaces import Spline, fill_jets, fill_values
 from .._kernels.surface.tridiagonal import solve_curvatures
+from .._support.memory import blocks
 from ..errors import FitError, InputError
 from ..validation import Array
-from .blocks import blocks
 from .bounds import Bounds, uniform_spacing
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
+from .._support.memory import blocks
 from ..errors import MapError
 from ..validation import Array
-from .blocks import blocks
 from .neighbours import bilinear, grown
 
 Cells = npt.NDArray[np.bool_]

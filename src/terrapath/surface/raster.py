@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +15,222 @@ from rasterio import Affine
 from ..errors import InputError, MapError
 from ..validation import Array
 from .bounds import Mask
-from .georeference import Georeference
-from .grid import Grid
+from .georeference import Georeference, local_projection, transformer, worst_scale
 from .surface import Surface
 
 if TYPE_CHECKING:
     from .holes import Cells
+
+
+SAME_PLACE = 1e-6  # cells
+MOST_DISTORTED = 0.001  # lengths in a map's own projection
+MOST_DISTORTED_UTM = 0.003  # and in transverse Mercator: 500 km from the central meridian
+WORST_SCALE = 0.01  # of a local projection at the map's edge
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells in rows and columns, as GDAL lays them out.
+
+    transform : from (column, row) corners to map coordinates. crs : None where unknown.
+    map_crs : the CRS that the data came in, where it is another one.
+    """
+
+    rows: int
+    columns: int
+    transform: Affine
+    crs: CRS | None = None
+    map_crs: CRS | None = None
+
+    @property
+    def is_upright(self) -> bool:
+        """Are rows and columns parallel to the axes, with x growing along the rows?"""
+        t = self.transform
+        return bool(t.b == 0.0 and t.d == 0.0 and t.a > 0.0)
+
+    @property
+    def needs_warp(self) -> bool:
+        """Is it in degrees, turned or not true to scale, so that it is not planned on as it is?"""
+        return not self.is_upright or self._needs_projection
+
+    @cached_property
+    def _needs_projection(self) -> bool:
+        """Is it in degrees, or in a projection that lengths are badly off in, as Web Mercator?"""
+        if self.crs is None:
+            return False
+        if self.crs.is_geographic:
+            return True
+        operation = self.crs.coordinate_operation
+        is_utm = operation is not None and operation.method_name == "Transverse Mercator"
+        return self._distortion() > (MOST_DISTORTED_UTM if is_utm else MOST_DISTORTED)
+
+    def _distortion(self) -> float:
+        """How far lengths in its projection are off at worst."""
+        assert self.crs is not None
+        worst = worst_scale(self.crs, *self.outline(None, points=5))
+        if not math.isfinite(worst):
+            corners = ", ".join(f"{value:.6g}" for value in self.extent())
+            raise MapError(
+                f"the map covers ({corners}) as (x_min, y_min, x_max, y_max), where its CRS, "
+                f"{self.crs.name}, does not reach; check the CRS"
+            )
+        return worst
+
+    @property
+    def cell(self) -> float:
+        """Side of the square that is as large as a cell, in the CRS's unit."""
+        t = self.transform
+        return math.sqrt(abs(t.a * t.e - t.b * t.d))
+
+    def reach(self, length: float) -> tuple[int, int]:
+        """How many rows and columns a length on the plane reaches over at most."""
+        columns, rows = np.meshgrid([0, self.columns - 1], [0, self.rows - 1])
+        corner = self._on_plane(columns, rows)
+        steps = ((columns, rows + 1), (columns + 1, rows))
+        sides = [np.hypot(*(self._on_plane(*step) - corner)).min() for step in steps]
+        return math.ceil(length / sides[0]), math.ceil(length / sides[1])
+
+    def _on_plane(self, columns: Array, rows: Array) -> Array:
+        """(2, ...): where corners between cells lie on the plane that is planned in."""
+        x, y = self.place(columns, rows)
+        plane = self._plane()
+        if self.crs is not None and plane is not None and plane != self.crs:
+            x, y = transformer(self.crs, plane).transform(x, y)
+        return np.asarray([x, y])
+
+    def place(self, column: Array | float, row: Array | float) -> tuple[Array, Array]:
+        """Map coordinates of the corners between cells."""
+        t = self.transform
+        columns, rows = np.asarray(column, np.float64), np.asarray(row, np.float64)
+        return t.a * columns + t.b * rows + t.c, t.d * columns + t.e * rows + t.f
+
+    def cells(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """(column, row) of map coordinates, counted from the first cell's centre."""
+        t = self.transform
+        area = t.a * t.e - t.b * t.d
+        # Differences first: coordinates are large against cells.
+        along, across = x - t.c, y - t.f
+        return (
+            (t.e * along - t.b * across) / area - 0.5,
+            (t.a * across - t.d * along) / area - 0.5,
+        )
+
+    def extent(self) -> tuple[float, float, float, float]:
+        """(x_min, y_min, x_max, y_max) of the cells' outer edges."""
+        columns = np.array([0, self.columns, 0, self.columns])
+        x, y = self.place(columns, np.array([0, 0, self.rows, self.rows]))
+        return float(x.min()), float(y.min()), float(x.max()), float(y.max())
+
+    def outline(self, crs: CRS | None, *, points: int = 33) -> tuple[Array, Array]:
+        """Coordinates in another CRS of points on the grid's edge and inside it."""
+        columns, rows = np.meshgrid(
+            np.linspace(0.0, self.columns, points), np.linspace(0.0, self.rows, points)
+        )
+        x, y = self.place(columns.ravel(), rows.ravel())
+        if crs is None or self.crs is None or crs == self.crs:
+            return x, y
+        x, y = transformer(self.crs, crs).transform(x, y)
+        known = np.isfinite(x) & np.isfinite(y)
+        return x[known], y[known]
+
+    def flipped(self) -> Grid:
+        """The same cells with the rows in the other order."""
+        t = self.transform
+        x, y = t.b * self.rows + t.c, t.e * self.rows + t.f
+        return replace(self, transform=Affine(t.a, -t.b, x, t.d, -t.e, y))
+
+    def southward(self) -> Grid:
+        """The same cells with rows from south to north, as surfaces have them."""
+        return self if self.transform.e > 0.0 else self.flipped()
+
+    def is_same(self, other: Grid) -> bool:
+        """Are the cells the same, in the same order? The CRS is not looked at."""
+        if (self.rows, self.columns) != (other.rows, other.columns):
+            return False
+        corners = np.array([0, self.columns, 0]), np.array([0, 0, self.rows])
+        ours, theirs = self.place(*corners), other.place(*corners)
+        off = max(float(np.abs(a - b).max()) for a, b in zip(ours, theirs, strict=True))
+        return off <= SAME_PLACE * self.cell
+
+    def window(self, rows: slice, columns: slice) -> Grid:
+        """Some of the rows and columns."""
+        t = self.transform
+        x, y = self.place(columns.start, rows.start)
+        return replace(
+            self,
+            rows=rows.stop - rows.start,
+            columns=columns.stop - columns.start,
+            transform=Affine(t.a, t.b, float(x), t.d, t.e, float(y)),
+        )
+
+    def coarser(self, factor: int) -> Grid:
+        """Cells ``factor`` times as large a side; what is left over at the end is left out."""
+        t, k = self.transform, factor
+        return replace(
+            self,
+            rows=self.rows // k,
+            columns=self.columns // k,
+            transform=Affine(k * t.a, k * t.b, t.c, k * t.d, k * t.e, t.f),
+        )
+
+    def centres(self) -> tuple[Array, Array]:
+        """Coordinates of the cell centres along x and y, for an upright grid."""
+        t = self.transform
+        x: Array = t.c + t.a * (np.arange(self.columns, dtype=np.float64) + 0.5)
+        y: Array = t.f + t.e * (np.arange(self.rows, dtype=np.float64) + 0.5)
+        return x, y
+
+    def _plane(self) -> CRS | None:
+        """The CRS to plan in: its own where that is true to scale, else a local projection."""
+        if self.crs is None or not self._needs_projection:
+            return self.crs
+        west, south, east, north = self.extent()
+        x, y = 0.5 * (west + east), 0.5 * (south + north)
+        if not self.crs.is_geographic:
+            x, y = transformer(self.crs, self.crs.geodetic_crs).transform(x, y)
+        elif max(abs(south), abs(north)) > 90.0 + self.cell:
+            raise MapError(
+                f"the map's latitudes are {south:.6g} to {north:.6g}; they must lie between -90 "
+                "and 90; check its CRS and the order of its axes"
+            )
+        body = self.crs.geodetic_crs
+        assert body is not None
+        plane = local_projection(body, x, y)
+        if (self.crs.is_geographic and east - west > 90.0) or self._off(plane) > WORST_SCALE:
+            across = f"{east - west:.4g} x {north - south:.4g}"
+            raise MapError(
+                f"the map reaches over {across} {self.crs.axis_info[0].unit_name}s, too far for "
+                "one local projection in metres; read a part of it with within=(x_min, y_min, "
+                "x_max, y_max), or bring it onto a projection of your choice first"
+            )
+        return plane
+
+    def _off(self, plane: CRS) -> float:
+        """How far lengths are off at worst in a transverse Mercator projection centred here."""
+        assert self.crs is not None
+        x, _ = self.outline(plane)
+        radius = self.crs.ellipsoid.semi_major_metre if self.crs.ellipsoid else 6.37e6
+        # The scale is 1 + (x/R)^2/2 at easting x.
+        return 0.5 * float(np.square(x).max()) / radius**2 if len(x) else math.inf
+
+    def planning_grid(self) -> Grid:
+        """Upright cells in a plane, rows from south to north: this grid's own where they are."""
+        if not self.needs_warp:
+            return self.southward()
+        from rasterio.warp import calculate_default_transform
+
+        plane = self._plane()
+        source_crs = self.crs.to_wkt() if self.crs else 'LOCAL_CS["plane"]'
+        plane_crs = plane.to_wkt() if plane else source_crs
+        try:
+            transform, columns, rows = calculate_default_transform(
+                source_crs, plane_crs, self.columns, self.rows, *self.extent()
+            )
+        except Exception as error:  # rasterio lets errors of GDAL's own kind through
+            reason = str(error).split("\n")[0]
+            raise MapError(f"the map cannot be brought onto a plane: {reason}") from None
+        return Grid(rows, columns, transform, plane, self.map_crs or self.crs).southward()
+
 
 LEAST_CELLS = 4
 

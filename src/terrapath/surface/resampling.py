@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from .._kernels.surface.surfaces import Spline, fill_values
+from .._support.memory import blocks
 from ..errors import MapError
 from ..validation import Array
-from .blocks import blocks
 from .fitting import interpolate
 from .georeference import transformer
-from .grid import SAME_PLACE, Grid
 from .holes import continue_into_holes, missing_cells
 from .neighbours import bilinear
+from .raster import SAME_PLACE, Grid
 
 LEAST_FOR_SPLINE = 4  # cells a side
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._support.memory import blocks
 from ..errors import InputError
 from ..validation import Array, require_not_negative
-from .blocks import blocks
 from .bounds import Bounds
 
 FEATURES_PER_SCALE = 2.0  # a resolution of half a standard deviation, as for Gaussian peaks

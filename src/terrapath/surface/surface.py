@@ -12,9 +12,9 @@ import numpy as np
 
 from .._kernels.surface.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
 from .._support.extras import require_packages
+from .._support.memory import blocks
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import Array, as_array, as_points, require_not_negative, require_positive
-from .blocks import blocks
 from .bounds import Bounds, Mask, as_bounds
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference

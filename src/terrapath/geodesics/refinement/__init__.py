@@ -12,8 +12,8 @@ from ...errors import InputError
 from ...problem import Path, Problem
 from ...surface import Surface
 from ...validation import Array, as_array, require_positive
-from .newton import shortest_polyline
-from .smooth import correct, curve_through, placed_parameters
+from .curve import curve_through
+from .newton import correct, placed_parameters, shortest_polyline
 
 __all__ = ["refine", "shortest_polyline"]
 

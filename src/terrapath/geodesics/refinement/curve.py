@@ -65,3 +65,8 @@ def spline_through(points: Array, degree: int) -> Curve:
     rows[row, degree + first[:, None] + np.arange(degree + 1) - row] = weights
     solve_banded(rows, coefficients)
     return Curve(degree, knots, coefficients)
+
+
+def curve_through(points: Array) -> Curve:
+    """The smooth curve through vertices (m, 2), with a parameter from 0 to 1."""
+    return spline_through(points, 5 if len(points) > 6 else 3)

@@ -15,8 +15,8 @@ from ...space.free_space import Circle, FreeSpace, Indices
 from ...surface import Surface
 from ...validation import Array
 from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
-from .newton import settle
-from .smooth import correct, curve_through, placed_parameters
+from .curve import curve_through
+from .newton import correct, placed_parameters, settle
 from .walls import Surroundings, surroundings
 
 # The distance between a path and what it touches, as a share of the region's side.

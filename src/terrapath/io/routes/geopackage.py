@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..._support.telling import silence
+from ...errors import silence
 from ...problem import Solution
 from ...surface.georeference import Georeference
 from .profile import clean, distinct, profile_columns

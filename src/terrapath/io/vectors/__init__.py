@@ -8,8 +8,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ..._support.telling import tell
-from ...errors import MapError
+from ...errors import MapError, tell
 from ...surface.bounds import Bounds
 from .layers import VectorWarning, read_layers
 from .plane import Plane, Where, placed

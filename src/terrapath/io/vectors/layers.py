@@ -16,8 +16,7 @@ from pyproj.exceptions import CRSError
 from shapely.geometry.base import BaseGeometry
 
 from ..._support.extras import require_packages
-from ..._support.telling import silence, tell
-from ...errors import MapError, TerrapathWarning
+from ...errors import MapError, TerrapathWarning, silence, tell
 from ...space.free_space import Geometries, Indices, simple_parts
 
 FARTHEST = 1e12  # no coordinate of a map is larger, in any unit

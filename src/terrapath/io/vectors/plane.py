@@ -13,8 +13,7 @@ from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 from shapely.geometry.base import BaseGeometry
 
-from ..._support.telling import tell
-from ...errors import InputError, MapError
+from ...errors import InputError, MapError, tell
 from ...space.free_space import POINTS, Geometries, outlines, simple_parts
 from ...surface import Surface
 from ...surface.bounds import Bounds

@@ -11,13 +11,14 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-from .._kernels import cache
-from .base import PROVING, Callback, Progress
+from . import cache
+
+# What the second process runs, with the names of rehearsals: a package above this one, so by name.
+REHEARSALS = "terrapath.planners.warmup"
 
 # Seconds that are waited for a process that does not end by itself.
 PATIENCE = 120.0
@@ -66,7 +67,7 @@ class SecondCore:
             return
         # Without the working directory among the places to import from. Its standard input ends
         # when this process does, however it does.
-        command = [sys.executable, "-P", "-m", f"{__package__}.warmup", *self.rehearsals]
+        command = [sys.executable, "-P", "-m", REHEARSALS, *self.rehearsals]
         nowhere = subprocess.DEVNULL
         with suppress(OSError):
             self.process = subprocess.Popen(
@@ -94,23 +95,6 @@ class SecondCore:
         process.wait()
         if process.stdin is not None:
             process.stdin.close()
-
-
-@contextmanager
-def bound_compiled_beside(surface_class: str, callback: Callback | None) -> Iterator[Callback]:
-    """Compile what proves the bound on a second core, while the planner's kernels are compiled.
-
-    surface_class : "peaks" or "spline". callback : a planner's; what is given stands for it, and
-    waits for the second core when the bound is begun.
-    """
-    with SecondCore(rehearsal_name("lower bounds", surface_class)) as second:
-
-        def watch(progress: Progress) -> bool:
-            if progress.stage == PROVING:
-                second.wait()
-            return callback is not None and bool(callback(progress))
-
-        yield watch
 
 
 def serve_first_core() -> None:
