@@ -56,5 +56,5 @@ def netcdf(path, array):
     dataset = array if isinstance(array, xarray.Dataset) else array.to_dataset(name="elevation")
     for name in dataset.data_vars:
         dataset[name].attrs["grid_mapping"] = "spatial_ref"
-    dataset.tonetcdf(path)
+    dataset.to_netcdf(path)
     return path
