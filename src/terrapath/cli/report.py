@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .._support.memory import peak_memory
-from ..certificates.certificate import Certificate
-from ..distance.field import DistanceField
-from ..planners import GoalAnswer
 from ..problem import Path, Problem, Solution, Status
 from ..scenario.answers import goal_status
 from ..surface import Layer, Surface
 from .console import percent, remark
+
+if TYPE_CHECKING:
+    from ..certificates.certificate import Certificate
+    from ..distance.field import DistanceField
+    from ..planners import GoalAnswer
 
 # Of the routes that a planner found besides the best, so many are shown.
 MOST_ALTERNATIVES = 5
