@@ -73,7 +73,7 @@ def test_the_checker_shares_nothing_with_the_solver():
         "problem",
         "space.lattice",
         "surface.bounds",
-        "surface.costs",
+        "surface.layers",
         "validation",
     }
     own = {"_kernels.certificates.surface_models", "_kernels.certificates.taylor"}

@@ -13,9 +13,9 @@ import numpy as np
 import rasterio
 import xarray
 from rasterio import Affine
-from terrapath.cli.streams import without_broken_messages
 
 import terrapath as tp
+from terrapath.cli.console import without_broken_messages
 
 UTM = "EPSG:32633"
 TRANSFORM = Affine(10.0, 0.0, 500_000.0, 0.0, -10.0, 4_000_120.0)

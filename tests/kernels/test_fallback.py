@@ -4,20 +4,20 @@ import json
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numba import config
 from numba.core.errors import TypingError
 
+from common import ROOT
 from kernel_copies import copy_machinery
 from processes import in_another_process
 from terrapath._kernels import fallback
 from terrapath._kernels.compiler import inner_kernel, kernel
 from terrapath.cli.main import run
 
-PYPROJECT = Path(__file__).parents[1] / "pyproject.toml"
+PYPROJECT = ROOT / "pyproject.toml"
 
 
 @pytest.mark.parametrize(

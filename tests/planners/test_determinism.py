@@ -160,7 +160,7 @@ def test_a_comment_in_any_kernel_module_changes_the_stamp(copied_kernels):
 def test_the_stamp_is_of_the_names_too_and_the_same_wherever_the_kernels_are(copied_kernels):
     shutil.rmtree(copied_kernels / "deep")
     assert cache.package_stamp(copied_kernels) == cache.STAMP == cache.package_stamp()
-    (copied_kernels / "four.py").rename(copied_kernels / "five.py")
+    (copied_kernels / "vec4.py").rename(copied_kernels / "vec5.py")
     assert cache.package_stamp(copied_kernels) != cache.STAMP
 
 

@@ -12,10 +12,10 @@ import pytest
 
 from terrapath._kernels import cache, second_core
 from terrapath._kernels.second_core import SecondCore
-from terrapath.cli import compiling
 from terrapath.cli.main import run
 from terrapath.planners import warmup
 from terrapath.planners.base import PROVING, REFINING, Progress
+from terrapath.scenario import answers
 
 NOTHING = "nothing at all"  # no rehearsal: the process ends by itself
 
@@ -164,14 +164,16 @@ def progress(stage):
 @pytest.mark.parametrize("surface_class", list(warmup.SURFACES))
 def test_the_bound_is_rehearsed_and_waited_for_when_it_is_begun(surface_class, recorder):
     seen = []
-    with compiling.bound_compiled_beside(surface_class) as joined:
-        watch = joined(lambda told: seen.append(told.stage))
+    with second_core.SecondCore(
+        second_core.rehearsal_name("lower bounds", surface_class)
+    ) as second:
+        watch = answers._waiting(second, lambda told: seen.append(told.stage))
         assert not watch(progress(REFINING))
         assert recorder == []
         watch(progress(PROVING))
         assert recorder == ["wait"]
-        assert joined(None)(progress(REFINING)) is False
-        assert joined(lambda told: True)(progress(REFINING)) is True
+        assert answers._waiting(second, None)(progress(REFINING)) is False
+        assert answers._waiting(second, lambda told: True)(progress(REFINING)) is True
     assert seen == [REFINING, PROVING]
     assert second_core.rehearsal_name("lower bounds", surface_class) in {
         rehearsal.name for rehearsal in warmup.rehearsals()

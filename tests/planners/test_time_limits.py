@@ -116,7 +116,7 @@ def test_names_are_known_before_any_planner_is_loaded():
     assert "terrapath.planners.rrt" not in before
     assert "terrapath.problem" not in before
     assert "terrapath.planners.rrt" in after
-    others = {"grid_search", "fast_marching", "geodesic_traversal", "optimal", "rrt_star"}
+    others = {"grid_search", "fast_marching", "geodesic_traversal", "optimal"}
     assert not {f"terrapath.planners.{name}" for name in others} & set(after)
 
 

@@ -15,8 +15,10 @@ from typer.main import get_command
 
 import terrapath as tp
 from terrapath.cli.main import run
+from terrapath.scenario import answers
+from terrapath.scenario.outputs import RouteOutputs
 
-plan, main = (import_module(f"terrapath.cli.{name}") for name in ("plan", "main"))
+main = import_module("terrapath.cli.main")
 
 SECONDS = 20  # for one damaged file, before it counts as hanging
 
@@ -122,19 +124,18 @@ def mutated_tokens(text, generator):
     return "\n".join(lines).encode("utf-8", "surrogatepass")
 
 
-def straight_answer(planner, asked, every, quiet):
+def straight_answer(run):
     """In place of planning: the problem is made, its ends are checked, a line is drawn."""
-    problem = asked.problem
-    return plan.Answer(
-        tp.Solution(
-            problem=problem,
-            planner=planner.name,
-            status=tp.Status.SOLVED,
-            path=problem.path([problem.start, problem.goal]),
-            cost=1.0,
-            seconds=0.0,
-        )
+    problem = run._itinerary().problem
+    solution = tp.Solution(
+        problem=problem,
+        planner=run.planner.name,
+        status=tp.Status.SOLVED,
+        path=problem.path([problem.start, problem.goal]),
+        cost=1.0,
+        seconds=0.0,
     )
+    return solution, ()
 
 
 def give_up(*_):
@@ -161,10 +162,11 @@ def folder(tmp_path, monkeypatch):
         frame.to_file(tmp_path / f"{name}.geojson")
     monkeypatch.chdir(tmp_path)
     # Typer makes its commands anew for every call, which takes as long as all the rest.
-    monkeypatch.setattr(main, "app", get_command(main.app))
+    command = get_command(main.application())
+    monkeypatch.setattr(main, "application", lambda names: command)
     # What is drawn and written has tests of its own, and would go where a mutation says.
-    monkeypatch.setattr(plan, "_solve", straight_answer)
-    monkeypatch.setattr(plan.RouteOutputs, "write", lambda *_: None)
+    monkeypatch.setattr(answers._Run, "whole", straight_answer)
+    monkeypatch.setattr(RouteOutputs, "write", lambda *_: None)
     return tmp_path
 
 

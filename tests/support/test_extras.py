@@ -13,11 +13,11 @@ from rasterio.transform import from_origin
 from scipy.io import netcdf_file
 
 import terrapath as tp
+from common import ROOT
 from processes import in_another_process
 from terrapath._support.extras import EXTRA_OF, require_packages
 from terrapath.cli.main import run
 
-ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 
@@ -88,7 +88,6 @@ IN_DEGREES = ("dem.tif", *ENDS)
 @pytest.mark.parametrize(
     ("package", "named", "arguments"),
     [
-        ("pyogrio", "route.gpkg", (*IN_DEGREES, "--output", "route.gpkg")),
         ("pyogrio", "route.gpkg", (*IN_DEGREES, "--output", "route.gpkg")),
         ("gpxpy", "route.gpx", (*IN_DEGREES, "--output", "route.gpx")),
         ("rosbags", "route.bag2", (*IN_DEGREES, "--output", "route.bag2")),

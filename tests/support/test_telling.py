@@ -69,12 +69,23 @@ def test_a_warning_may_be_made_an_error(obstacles):
 
 
 def test_the_innermost_listener_is_told():
-    with collecting() as outer:
+    outer, inner = [], []
+    with told_to(outer.append):
         tell(said("one"))
-        with collecting() as inner:
+        with told_to(inner.append):
             tell(said("two"))
         tell(said("three"))
     assert (texts(outer), texts(inner)) == (["one", "three"], ["two"])
+
+
+def test_what_is_collected_is_heard_outside_as_well_as_it_comes():
+    heard = []
+    with told_to(heard.append):
+        with collecting() as collected:
+            tell(said("one"))
+            assert texts(heard) == ["one"]
+        tell(said("two"))
+    assert (texts(heard), texts(collected)) == (["one", "two"], ["one"])
 
 
 def test_an_error_ends_the_listening():
