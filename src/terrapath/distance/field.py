@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,12 +15,14 @@ from .._kernels.distance import calendar_queue, dependents, descent, eikonal as 
 from .._kernels.surface.metric_rows import ROWS, columns_of
 from ..errors import InputError, OutsideSurfaceError
 from ..problem import Path, Problem
-from ..space.constraints import Area
 from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, PointLike, as_array, as_point, as_points
 from .source import SEED_RADIUS, SourceModel, model_source, near_distance, window_radius
+
+if TYPE_CHECKING:
+    from ..space.constraints import Area
 
 # The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
 BUCKET_SHARE = 4.0

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import BlockedError, InputError, OutsideSurfaceError
-from ..space.constraints import Area, Constraints, outside_of
-from ..space.free_space import Obstacle
+from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import default_spacing
 from ..surface import Surface, metric
 from ..surface.bounds import Bounds, as_bounds
@@ -20,6 +19,7 @@ from ..validation import Point, PointLike, as_point, require_not_negative
 from .solution import Path
 
 if TYPE_CHECKING:
+    from ..space.constraints import Area, Constraints
     from ..space.slope_limit import SlopeLimit
 
 
@@ -67,12 +67,21 @@ class Problem:
         self.radius = float(radius)
         self.max_slope = max_slope
         self.keep_in = keep_in
-        self.constraints = self._constraints()
-        self.free_space = self.constraints.free_space()
+        self.free_space = self._free_space()
         self.start = self._check("start", start)
         self.goal = self._check("goal", goal)
 
-    def _constraints(self) -> Constraints:
+    def _free_space(self) -> FreeSpace:
+        limits = (self.obstacles, self.surface.nodata, self.max_slope, self.keep_in)
+        if all(limit is None or limit == () for limit in limits):
+            return FreeSpace(self.bounds)  # all of the bounds
+        return self.constraints.free_space()
+
+    @cached_property
+    def constraints(self) -> Constraints:
+        """All that limits where a path may go, as it was given."""
+        from ..space.constraints import Constraints, outside_of
+
         outside = None
         if self.keep_in is not None:
             outside = outside_of(self.keep_in, self.bounds, self.radius)

@@ -6,7 +6,8 @@ import enum
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +17,6 @@ from ..surface import Surface, metric
 from ..validation import Array
 
 if TYPE_CHECKING:
-    from ..certificates.certificate import Certificate
-    from ..planners.corridor import Corridor
     from .problem import Problem
 
 
@@ -161,6 +160,39 @@ class SearchTree(NamedTuple):
         return np.stack([self.points[self.parents[children]], self.points[children]], axis=1)
 
 
+class Proof(Protocol):
+    """What proves a lower bound: see ``terrapath.Certificate``."""
+
+    @property
+    def value(self) -> float:
+        """The lower bound, map units."""
+
+    def save(self, path: str | FilePath) -> None:
+        """Write it, to be checked again."""
+
+    def check(self, problem: Problem) -> float:
+        """Prove it again; returns the lower bound. Raises CertificateError where it fails."""
+
+
+class PlannedPart(Protocol):
+    """The part of a map that was planned on: see ``terrapath.planners.corridor.Corridor``."""
+
+    @property
+    def half_width(self) -> float:
+        """On both sides of the coarse route, map units."""
+
+    @property
+    def decimate(self) -> int:
+        """How many cells of the map, on a side, became one for the coarse route."""
+
+    @property
+    def coarse_length(self) -> float:
+        """Length of the coarse route, map units."""
+
+    def least_length(self, solution: Solution) -> float | None:
+        """No path on the whole map is shorter, map units; None where nothing is proven of it."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Solution:
     """What a planner found.
@@ -182,13 +214,13 @@ class Solution:
     lower_bound: float | None = None  # on the length of every path, map units
     alternatives: tuple[Path, ...] = ()  # further paths, shortest first
     unrefined: Path | None = None  # the planner's own path, where it was refined
-    certificate: Certificate | None = None  # the proof of the lower bound
+    certificate: Proof | None = None  # the proof of the lower bound
     history: History | None = None  # of tree planners
     tree: SearchTree | None = None  # of tree planners
     counters: dict[str, int] = field(default_factory=dict)  # of vertices and edges, by name
     legs: tuple[Solution, ...] = ()  # of a tour, from each stop to the next
     options: dict[str, Any] = field(default_factory=dict)  # the planner's, as it was run
-    corridor: Corridor | None = None  # the lower bound holds only in it; None for everywhere
+    corridor: PlannedPart | None = None  # the lower bound holds only in it; None for everywhere
 
     @property
     def length(self) -> float | None:
