@@ -53,7 +53,8 @@ def plan_tour(
     a path only if it leads to the goal.
     Raises InputError for a waypoint that is not free or outside the bounds.
     """
-    return _Tour(problem, planner, callback, 1).solve([*via, problem.goal])
+    tour = _Tour(problem, planner, callback, 1)
+    return tour.solve([*tour.checked(via), problem.goal])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,10 +90,7 @@ def plan_goals(
     """
     if not goals:
         raise InputError("goals=[] names no goal; give at least one")
-    ends = [
-        problem.between(problem.start, goal, ("start", _goal_name(goals, k))).goal
-        for k, goal in enumerate(goals)
-    ]
+    ends = [problem.checked(goal, _goal_name(goals, k)) for k, goal in enumerate(goals)]
     tour = _Tour(problem, planner, callback, len(ends))
     stops = [problem.start, *tour.checked(via)]
     chords = [metric.chord_through(problem.surface, [*stops, end]) for end in ends]
@@ -162,17 +160,13 @@ class _Tour:
 
     def checked(self, via: Sequence[PointLike]) -> list[Point]:
         """The waypoints; InputError where one is not in free space."""
-        start = self.problem.start
-        return [
-            self.problem.between(start, point, ("start", f"via {k}")).goal
-            for k, point in enumerate(via, start=1)
-        ]
+        return [self.problem.checked(point, f"via {k}") for k, point in enumerate(via, start=1)]
 
-    def solve(self, stops: Sequence[PointLike]) -> Solution:
-        """Plan through all the stops, of which the last is the goal."""
-        points = [self.problem.start, *self.checked(stops[:-1]), stops[-1]]
-        whole = self.problem.between(self.problem.start, stops[-1])
-        legs = [whole.between(a, b) for a, b in pairwise(points)]
+    def solve(self, stops: Sequence[Point]) -> Solution:
+        """Plan through all the stops, of which the last is the goal. All of them are checked."""
+        points = [self.problem.start, *stops]
+        whole = self.problem.between_checked(self.problem.start, stops[-1])
+        legs = [whole.between_checked(a, b) for a, b in pairwise(points)]
         if len(legs) > 1 and any(leg.is_unreachable for leg in legs):
             k = next(k for k, leg in enumerate(legs, start=1) if leg.is_unreachable)
             reason = f"leg {k} of {len(legs)}: {SEPARATED}"

@@ -68,8 +68,8 @@ class Problem:
         self.max_slope = max_slope
         self.keep_in = keep_in
         self.free_space = self._free_space()
-        self.start = self._check("start", start)
-        self.goal = self._check("goal", goal)
+        self.start = self.checked(start, "start")
+        self.goal = self.checked(goal, "goal")
 
     def _free_space(self) -> FreeSpace:
         limits = (self.obstacles, self.surface.nodata, self.max_slope, self.keep_in)
@@ -119,7 +119,12 @@ class Problem:
             )
         return rectangle
 
-    def _check(self, name: str, value: PointLike) -> Point:
+    def checked(self, value: PointLike, name: str) -> Point:
+        """A point of free space, (x1, x2), map units. name : what errors call it.
+
+        Raises InputError for what is no point, OutsideSurfaceError outside the bounds,
+        BlockedError on what the vehicle has to keep away from.
+        """
         point = as_point(value, name)
         if not self.bounds.contains(np.array(point)):
             shown = f"{name}=({point[0]:.10g}, {point[1]:.10g}) is outside the bounds {self.bounds}"
@@ -130,17 +135,19 @@ class Problem:
         shown = f"{name}=({point[0]:.10g}, {point[1]:.10g})"
         raise BlockedError(f"{shown} is {blocker}; move it to free ground")
 
-    def between(
-        self, start: PointLike, goal: PointLike, names: tuple[str, str] = ("start", "goal")
-    ) -> Problem:
+    def between(self, start: PointLike, goal: PointLike) -> Problem:
         """The same problem with another start and goal, (x1, x2), map units.
 
-        names : what errors call them. Raises as ``Problem`` does.
+        Raises as ``Problem`` does.
         """
+        return self.between_checked(self.checked(start, "start"), self.checked(goal, "goal"))
+
+    def between_checked(self, start: Point, goal: Point) -> Problem:
+        """The same problem with another start and goal that ``checked`` has returned."""
         other = copy.copy(self)
         for known in ("straight_length", "is_unreachable"):
             other.__dict__.pop(known, None)
-        other.start, other.goal = self._check(names[0], start), self._check(names[1], goal)
+        other.start, other.goal = start, goal
         return other
 
     def path(self, points: npt.ArrayLike) -> Path:
