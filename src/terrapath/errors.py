@@ -1,7 +1,8 @@
-"""What goes wrong: errors, and warnings for whoever listens.
+"""Errors, and warnings that a listener can receive.
 
 Every message names the value, the limit and the remedy. A warning goes to the listener of the
-context, so each thread and each task has its own; where there is none, it is one of Python's.
+current context, so each thread and each task has its own. Without a listener it becomes an
+ordinary Python warning.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import TypeAlias
 
 
 class TerrapathError(Exception):
-    """Base of every error that Terrapath raises on purpose. The command exits with 2."""
+    """Base of every error that Terrapath raises on purpose. The command line exits with code 2."""
 
 
 class InputError(TerrapathError, ValueError):
@@ -30,19 +31,19 @@ class OutsideSurfaceError(InputError):
 
 
 class BlockedError(InputError):
-    """A point that no path can be at."""
+    """A point that no path can pass through, because it is not in free space."""
 
 
 class FitError(InputError):
-    """A function that no spline of a reasonable size follows to the asked tolerance."""
+    """A function that no spline of a reasonable size approximates within the tolerance."""
 
 
 class MapError(TerrapathError):
-    """A file that cannot be read as a map, or written."""
+    """A map or another file that cannot be read, or cannot be written."""
 
 
 class MissingExtraError(TerrapathError, ImportError):
-    """A package that not every installation has. The message names the command to install it."""
+    """An optional package is not installed. The message names the command that installs it."""
 
 
 class CertificateError(TerrapathError):
@@ -50,7 +51,7 @@ class CertificateError(TerrapathError):
 
 
 class TerrapathWarning(UserWarning):
-    """Base of every warning that Terrapath gives on purpose. The command shows it as one line."""
+    """Base of every warning that Terrapath gives on purpose. The command line prints it on one line."""
 
 
 class KernelWarning(TerrapathWarning, RuntimeWarning):
@@ -58,7 +59,7 @@ class KernelWarning(TerrapathWarning, RuntimeWarning):
 
 
 class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
-    """A path could not be refined or bounded, and is left out or given as it was before."""
+    """A path could not be refined or bounded. It is left out, or returned as it was before."""
 
 
 Listener: TypeAlias = Callable[[TerrapathWarning], object]
@@ -69,7 +70,7 @@ _listener: ContextVar[Listener | None] = ContextVar("terrapath_listener", defaul
 
 
 def tell(warning: TerrapathWarning) -> None:
-    """Hand a warning to the listener; where there is none, warn at the line that called us."""
+    """Send a warning to the listener; without one, warn at the line that called Terrapath."""
     listener = _listener.get()
     if listener is None:
         warnings.warn(warning, stacklevel=_level_outside())
@@ -78,16 +79,17 @@ def tell(warning: TerrapathWarning) -> None:
 
 
 def tell_unfinished(what: str, error: Exception) -> None:
-    """Tell what could not be done, and why."""
+    """Warn that something could not be done, and say why."""
     reason = " ".join(f"{type(error).__name__}: {error}".split())
     tell(UnfinishedWarning(f"{what}: {reason}"))
 
 
 @contextmanager
 def told_to(listener: Listener) -> Iterator[None]:
-    """Inside, ``listener`` gets each warning as it comes, and nobody else does.
+    """Send the warnings of the ``with`` block to ``listener`` alone, each at once.
 
-    Of listeners inside one another the innermost gets it. A new thread starts without any.
+    Where such blocks are nested, the innermost listener gets them. A new thread starts without a
+    listener.
     """
     before = _listener.set(listener)
     try:
@@ -98,9 +100,9 @@ def told_to(listener: Listener) -> Iterator[None]:
 
 @contextmanager
 def collecting() -> Iterator[list[TerrapathWarning]]:
-    """The list that the warnings given inside are added to, in their order.
+    """Collect the warnings of the ``with`` block in a list, in their order.
 
-    Whoever listens outside hears of them as well, as they come.
+    A listener outside the block gets each of them too, at once.
     """
     collected: list[TerrapathWarning] = []
     outside = _listener.get()
@@ -115,10 +117,11 @@ def collecting() -> Iterator[list[TerrapathWarning]]:
 
 
 def silence(category: type[Warning], module: str) -> None:
-    """From now on, ignore what is warned of in one module of a library that we read files with.
+    """Ignore one category of warnings from one module of another library, from now on.
 
-    Set once and for good: filters that come and go are seen by all threads. So name exactly
-    the module and the category. Asked for at each use, for others may reset the filters.
+    The filter is never removed: all threads share the filters, so a temporary one would disturb
+    other threads. For the same reason, name the module and the category exactly. Call this at
+    each use, because other code may reset the filters.
     """
     pattern = re.escape(module) + r"\Z"
     if ("ignore", None, category, re.compile(pattern), 0) not in warnings.filters:
@@ -126,7 +129,7 @@ def silence(category: type[Warning], module: str) -> None:
 
 
 def _level_outside() -> int:
-    """The ``stacklevel``, for ``tell``, of the first caller that is not Terrapath's own."""
+    """The ``stacklevel`` for ``tell``: that of the first caller outside Terrapath."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         level, frame = level + 1, frame.f_back

@@ -1,11 +1,11 @@
-"""Checks at the boundary: arrays are laid out and options checked once, here."""
+"""Checks of arguments, made once: arrays get their type and layout here, options are checked."""
 
 from __future__ import annotations
 
 import math
 import numbers
 from collections.abc import Sequence
-from typing import Any
+from typing import TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ Point = tuple[float, float]
 PointLike = Sequence[float] | Array  # (x1, x2), not checked yet
 
 
-def as_array(values: Any, name: str, *, shape: tuple[int | None, ...]) -> Array:
+def as_array(values: npt.ArrayLike, name: str, *, shape: tuple[int | None, ...]) -> Array:
     """A finite float64 array in C order; ``None`` in ``shape`` stands for any size."""
     try:
         array = np.ascontiguousarray(values, dtype=np.float64)
@@ -39,7 +39,7 @@ def as_array(values: Any, name: str, *, shape: tuple[int | None, ...]) -> Array:
     return array
 
 
-def as_point(value: Any, name: str) -> Point:
+def as_point(value: PointLike, name: str) -> Point:
     """One finite point of the plane."""
     try:
         x, y = (float(coordinate) for coordinate in value)
@@ -50,8 +50,8 @@ def as_point(value: Any, name: str) -> Point:
     return x, y
 
 
-def as_points(points: Any, name: str = "points") -> Array:
-    """(..., 2) finite points; the leading axes are kept."""
+def as_points(points: npt.ArrayLike, name: str = "points") -> Array:
+    """Finite points (..., 2); the leading axes are kept."""
     array = np.asarray(points)
     if array.ndim == 0 or array.shape[-1] != 2:
         raise InputError(f"{name} has shape {array.shape}; the last axis must be (x1, x2)")
@@ -59,61 +59,61 @@ def as_points(points: Any, name: str = "points") -> Array:
     return flat.reshape(array.shape)
 
 
-def _describe(value: Any) -> str:
+def _describe(value: object) -> str:
     return repr(value) if not isinstance(value, float) else f"{value:g}"
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
-def _is_whole(value: Any) -> bool:
+def _is_whole(value: object) -> TypeGuard[int]:
     return _is_number(value) and isinstance(value, numbers.Integral)
 
 
-def require_positive(**values: Any) -> None:
-    """Each value is a finite number above 0."""
+def require_positive(**values: object) -> None:
+    """Raise InputError unless each value is a finite number above 0."""
     for name, value in values.items():
         if not (_is_number(value) and math.isfinite(value) and value > 0):
             raise InputError(f"{name}={_describe(value)} must be a finite number above 0")
 
 
-def require_not_negative(**values: Any) -> None:
-    """Each value is a finite number, 0 or above."""
+def require_not_negative(**values: object) -> None:
+    """Raise InputError unless each value is a finite number, 0 or above."""
     for name, value in values.items():
         if not (_is_number(value) and math.isfinite(value) and value >= 0):
             raise InputError(f"{name}={_describe(value)} must be a finite number, 0 or above")
 
 
-def require_fraction(**values: Any) -> None:
-    """Each value lies in [0, 1]."""
+def require_fraction(**values: object) -> None:
+    """Raise InputError unless each value lies in [0, 1]."""
     for name, value in values.items():
         if not (_is_number(value) and 0 <= value <= 1):
             raise InputError(f"{name}={_describe(value)} must lie between 0 and 1")
 
 
-def require_count(most: int = 2**31 - 3, **values: Any) -> None:
-    """Each value is an integer from 1 to ``most``."""
+def require_count(most: int = 2**31 - 3, **values: object) -> None:
+    """Raise InputError unless each value is an integer from 1 to ``most``."""
     for name, value in values.items():
         if not (_is_whole(value) and 1 <= value <= most):
             raise InputError(f"{name}={_describe(value)} must be a whole number from 1 to {most:,}")
 
 
-def require_bool(**values: Any) -> None:
-    """Each value is True or False."""
+def require_bool(**values: object) -> None:
+    """Raise InputError unless each value is True or False."""
     for name, value in values.items():
         if not isinstance(value, bool):
             raise InputError(f"{name}={value!r} must be True or False")
 
 
-def require_seed(seed: Any) -> None:
-    """A seed is an integer, 0 or above."""
+def require_seed(seed: object) -> None:
+    """Raise InputError unless a seed is an integer, 0 or above."""
     if not (_is_whole(seed) and seed >= 0):
         raise InputError(f"seed={_describe(seed)} must be a whole number, 0 or above")
 
 
-def require_choice(choices: tuple[str, ...], **values: Any) -> None:
-    """Each value is one of the known words."""
+def require_choice(choices: tuple[str, ...], **values: object) -> None:
+    """Raise InputError unless each value is one of the choices."""
     for name, value in values.items():
         if value not in choices:
             raise InputError(f"{name}={value!r} is not known; choose one of {', '.join(choices)}")

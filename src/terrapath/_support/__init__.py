@@ -1,1 +1,1 @@
-"""What every package may use: files, memory, who watches long work, and who is told."""
+"""Helpers for every package: files, memory, optional packages and progress."""

@@ -1,4 +1,4 @@
-"""Packages that only some of Terrapath needs: installed on request, asked for here."""
+"""Optional packages: only some parts of Terrapath need them, and pip installs them as extras."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ EXTRA_OF = {
 
 
 def require_packages(wanted: str, *packages: str) -> None:
-    """Raise MissingExtraError where a package of one of the extras is not installed.
+    """Raise MissingExtraError where one of the optional packages is not installed.
 
-    wanted : what was asked for, the subject of the message. Nothing is imported yet, so this
-    can be asked before a long computation.
+    wanted : what needs the packages; the subject of the message. Nothing is imported, so this
+    check is quick and can come before a long computation.
     """
     for package in packages:
         if find_spec(package) is None:

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all."""
+"""Writes files completely or not at all."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from pathlib import Path
 
 from ..errors import MapError
 
-# The one output that is a folder: a ROS 2 bag, and the file that tells that a folder is one.
+# A ROS 2 bag is the one output that is a folder; every bag contains this file.
 BAG_ENDING, BAG_MARK = ".bag2", "metadata.yaml"
 
-# Short, for a name of the output's own length may leave no room for more.
+# The start of temporary names. Short, because a path may be almost as long as is allowed.
 TEMPORARY = ".terrapath-"
 
 
 def is_there(path: Path) -> bool:
-    """Is there a file or a folder? No name that none can have is there."""
+    """Is there a file or a folder? False also for a name that none can have."""
     try:
         return path.exists()
     except (OSError, ValueError):
@@ -28,17 +28,17 @@ def is_there(path: Path) -> bool:
 
 
 def _require_bag(path: Path) -> None:
-    """Raise OSError where something else than a bag, or than an empty folder, would be lost."""
+    """Raise OSError where writing a bag would replace anything but a bag or an empty folder."""
     if not path.exists() and not path.is_symlink():
         return
     if path.is_symlink() or not path.is_dir():
-        raise NotADirectoryError(f"{path} is there already and is no folder")
+        raise NotADirectoryError(f"{path} exists already and is not a folder")
     if any(path.iterdir()) and not (path / BAG_MARK).is_file():
         raise FileExistsError(f"{path} is a folder that holds other things than a ROS 2 bag")
 
 
 def require_writable(path: Path) -> None:
-    """Raise MapError where a file cannot be written, without leaving anything there."""
+    """Raise MapError where a file cannot be written; the check leaves no file behind."""
     try:
         _require_name(path)
         if path.suffix.lower() == BAG_ENDING:
@@ -58,18 +58,18 @@ def require_writable(path: Path) -> None:
 
 
 def _require_name(path: Path) -> None:
-    """Raise OSError for a name that no file can have, as one that is too long."""
+    """Raise OSError for a name that no file can have, such as one that is too long."""
     with suppress(FileNotFoundError):
         path.lstat()
 
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path``; it takes its place only when all went well."""
+    """Give a temporary path beside ``path``, which replaces ``path`` only without an error."""
     try:
         temporary = path.parent / f"{TEMPORARY}{secrets.token_hex(8)}{path.suffix}"
-        # A new file of nobody else's, which may be read by whom the process lets: one of
-        # ``tempfile`` would be ours alone, and the process's mask cannot be read, only set.
+        # A new file with the usual permissions of this process. A file made by ``tempfile`` would
+        # be readable by its owner only, and the umask cannot be read without setting it.
         temporary.touch(exist_ok=False)
         try:
             yield temporary
@@ -82,9 +82,9 @@ def written_whole(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def folder_written_whole(path: Path) -> Iterator[Path]:
-    """A path for a new folder of the same name; it takes its place only when all went well.
+    """Give a path for a new folder, which is moved to ``path`` only without an error.
 
-    It replaces an older bag, and nothing else: see ``require_writable``.
+    It may replace an older bag or an empty folder, and nothing else: see ``require_writable``.
     """
     try:
         _require_bag(path)
@@ -92,7 +92,7 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
             made, old, new = (Path(aside, name) for name in (path.name, "replaced", "new"))
             new.mkdir()
             yield made
-            made.chmod(stat.S_IMODE(new.stat().st_mode))  # as the process makes folders
+            made.chmod(stat.S_IMODE(new.stat().st_mode))  # the usual permissions of this process
             if path.exists():
                 path.rename(old)
             try:

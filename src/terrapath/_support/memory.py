@@ -1,4 +1,4 @@
-"""Memory: how much was in use at most, and blocks of large arrays, so that it is little."""
+"""Memory: the peak of a process, and work on large arrays in blocks, which keeps it low."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 
 
 def peak_memory() -> int | None:
-    """The most memory that this process has had, bytes; None where the system does not tell.
+    """The most memory that this process has used, bytes; None where the system does not know.
 
-    Not by ``ru_maxrss`` where there is ``/proc``: a process inherits its parent's there.
+    Where there is ``/proc``, ``ru_maxrss`` is not used: it includes the peak of the parent process.
     """
     try:
         lines = Path("/proc/self/status").read_text(errors="replace").splitlines()
@@ -30,16 +30,16 @@ def _peak_memory_elsewhere() -> int | None:
 
 
 def forget_peak() -> None:
-    """Let the peak start anew from here, where the system can; compiling had one of its own."""
+    """Reset the peak, where the system can, so that the memory for compiling is not counted."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
 
 
-BLOCK = 2**20  # values that are worked on at once
+BLOCK = 2**20  # values that are processed at once
 
 
 def blocks(count: int, width: int) -> Iterator[slice]:
-    """Slices of ``count`` lines, each of ``width`` values, that hold a block together."""
+    """Slices of ``count`` lines of ``width`` values; each slice has about one block of values."""
     size = max(1, BLOCK // max(width, 1))
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))

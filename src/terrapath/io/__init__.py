@@ -1,6 +1,6 @@
-"""Maps and obstacles in, routes and distance fields out.
+"""Reads maps and obstacles; writes routes and distance fields.
 
-Each name is imported at its first use: reading maps takes libraries that writing a route does not.
+Each name is imported at its first use: reading maps needs libraries that writing a route does not.
 """
 
 import lazy_loader

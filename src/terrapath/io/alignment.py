@@ -1,4 +1,4 @@
-"""Further layers brought onto the grid of the heights."""
+"""Brings further layers onto the grid of the heights."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .bands import Band, Part, View
 
 
 def placed(name: str, band: Band, base: Grid, crs: CRS | None) -> Band:
-    """A layer with a CRS, the given one or that of the heights whose cells it has."""
+    """The layer with a CRS: its own, the given one, or that of heights with the same cells."""
     grid = band.grid
     if grid.crs is None and crs is not None:
         return replace(band, grid=replace(grid, crs=crs))
@@ -27,7 +27,7 @@ def placed(name: str, band: Band, base: Grid, crs: CRS | None) -> Band:
     if not _has_cells_of(grid, base):
         raise MapError(
             f"layer {name!r} lies on another grid than the heights and at least one of them has "
-            "no CRS, so they cannot be brought together; assign it, as in crs='EPSG:32633'"
+            "no CRS, so they cannot be aligned; give the CRS, as in crs='EPSG:32633'"
         )
     return replace(band, grid=replace(grid, crs=base.crs))
 
@@ -39,8 +39,8 @@ def _has_cells_of(grid: Grid, other: Grid) -> bool:
 def read_all(parts: Sequence[Part], base: View, target: Grid, most_cells: int) -> Array:
     """All layers (layers, rows, columns) on the cells of the target.
 
-    The first are the heights, of which ``base`` is seen. most_cells : a layer that needs more is
-    refused before memory is taken.
+    The first layer is the heights; ``base`` is the part of them that is read. most_cells : a layer
+    that needs more cells is refused before memory is allocated.
     """
     views = [base, *(_view_onto(part, base, target) for part in parts[1:])]
     for view in views:
@@ -55,7 +55,7 @@ def read_all(parts: Sequence[Part], base: View, target: Grid, most_cells: int) -
 
 
 def _view_onto(part: Part, base: View, target: Grid) -> View:
-    """What the map needs of a layer, no finer than the map."""
+    """The part of a layer that covers the map, with cells no finer than the map's."""
     grid = part.band.grid
     if grid.crs == base.band.grid.crs and grid.is_same(base.band.grid):
         return replace(base, band=part.band)
@@ -71,7 +71,7 @@ def _view_onto(part: Part, base: View, target: Grid) -> View:
 
 
 def _costs_onto(name: str, view: View, target: Grid, out: Array) -> None:
-    """Costs on the target's cells, within the range that they have: logarithms, bilinear."""
+    """Resample costs to the target's cells: bilinear in their logarithms, so within their range."""
     values = _read(view)
     _require_costs(name, values, view.grid)
     np.log(values, out=values)

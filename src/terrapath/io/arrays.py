@@ -21,7 +21,7 @@ from .rasters import HEIGHT_NAMES, reading, with_crs
 X_NAMES = ("x", "lon", "longitude", "easting", "eastings", "east", "projection_x_coordinate")
 Y_NAMES = ("y", "lat", "latitude", "northing", "northings", "north", "projection_y_coordinate")
 DEGREES = ("degree", "degrees", "deg")
-UNEQUAL = 0.05  # cells that a coordinate may be off the equal steps between its ends
+UNEQUAL = 0.05  # how far, in cells, a coordinate may be from its place in equal steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class ArrayBand(Band):
 
     def read(self, rows: slice, columns: slice) -> Array:
         """Values (rows, columns) with scale and offset applied, NaN where there is no data."""
-        with reading(self.label, is_file=False):  # an xarray object reads its file only now
+        with reading(self.label, is_file=False):  # an xarray object may read its file only here
             part = self.array[rows, columns]
             part = np.ma.asarray(getattr(part, "values", part))
         with np.errstate(over="ignore", invalid="ignore"):
@@ -50,7 +50,10 @@ class ArrayBand(Band):
 
 
 def band_of_numpy(source: tuple[Any, Any, Any], which: int | str, crs: CRS | None) -> ArrayBand:
-    """(values, x, y): values (ny, nx) at the coordinates of the cell centres; which : 1."""
+    """The band of (values, x, y): values (ny, nx) at the coordinates of the cell centres.
+
+    which : the number of the band; it must be 1.
+    """
     values, x, y = source
     _require_band(which, 1, "the array")
     x, y = as_array(x, "x", shape=(None,)), as_array(y, "y", shape=(None,))
@@ -62,9 +65,10 @@ def band_of_numpy(source: tuple[Any, Any, Any], which: int | str, crs: CRS | Non
 
 
 def band_of_xarray(source: Any, which: int | str, crs: CRS | None, *, label: str = "") -> ArrayBand:
-    """A variable of a Dataset or a band of a DataArray; which : 1-based number, or the name.
+    """The band of a DataArray, or of a variable of a Dataset.
 
-    label : what messages call it; by default the array's name.
+    which : the number of the band, from 1, or the name of the variable. label : its name in
+    messages; by default the array's name.
     """
     array, which = _variable(source, which) if hasattr(source, "data_vars") else (source, which)
     if not label:
@@ -72,7 +76,7 @@ def band_of_xarray(source: Any, which: int | str, crs: CRS | None, *, label: str
     _require_numbers(array.dtype, label)
     x, y = (_dimension(array, axis, label) for axis in ("x", "y"))
     array = _plane(array, x, y, which, label).transpose(y, x)
-    found = with_crs(_crs(source, array, x, y), crs, label)
+    crs = with_crs(_crs(source, array, x, y), crs, label)
     attributes = array.attrs
     described: dict[str, Any] = {"label": label, "unit": str(attributes.get("units", ""))}
     described["no_data"] = tuple(
@@ -83,12 +87,12 @@ def band_of_xarray(source: Any, which: int | str, crs: CRS | None, *, label: str
     described["scale"] = float(attributes.get("scale_factor", 1.0))
     described["offset"] = float(attributes.get("add_offset", 0.0))
     if x not in array.coords or y not in array.coords:
-        grid = _grid_of_transform(source, array, found, label)
+        grid = _grid_of_transform(source, array, crs, label)
         return ArrayBand(grid=grid, array=array, step=_step(array, described["scale"]), **described)
     x_axis, y_axis = (
         as_array(array[axis].values, f"{axis} of {label}", shape=(None,)) for axis in (x, y)
     )
-    return _on_axes(array, x_axis, y_axis, found, **described)
+    return _on_axes(array, x_axis, y_axis, crs, **described)
 
 
 def _require_band(which: int | str, count: int, label: str) -> None:
@@ -108,7 +112,7 @@ def _step(array: Any, scale: float) -> float:
 def _on_axes(
     array: Any, x: Array, y: Array, crs: CRS | None, *, scale: float = 1.0, **described: Any
 ) -> ArrayBand:
-    """A band at the coordinates of its cell centres, which may fall."""
+    """A band from the coordinates of its cell centres, which may decrease."""
     label = described["label"]
     (x0, dx), (y0, dy) = _steps(x, f"x of {label}"), _steps(y, f"y of {label}")
     if dx < 0.0:
@@ -125,15 +129,15 @@ def _steps(axis: Array, name: str) -> tuple[float, float]:
     first, step = float(axis[0]), float((axis[-1] - axis[0]) / (len(axis) - 1))
     off = np.abs(axis - np.linspace(axis[0], axis[-1], len(axis))).max()
     if step == 0.0 or off > UNEQUAL * abs(step):
-        raise MapError(f"{name} does not go in equal steps; resample it to equal steps first")
+        raise MapError(f"{name} is not in equal steps; resample it to equal steps first")
     return first, step
 
 
-# What an array calls its dimensions, variables and CRS
+# The dimensions, variables and CRS of an array
 
 
 def _variable(dataset: Any, which: int | str) -> tuple[Any, int | str]:
-    """The variable of heights, or the one that is named; and which band of it."""
+    """The named variable, or else the one that holds heights; and the number of its band."""
     maps = {
         str(name): variable for name, variable in dataset.data_vars.items() if variable.ndim >= 2
     }
@@ -153,9 +157,9 @@ def _variable(dataset: Any, which: int | str) -> tuple[Any, int | str]:
 
 
 def _dimension(array: Any, axis: str, label: str) -> Hashable:
-    """The dimension along x or y, by CF attributes first, by its name else."""
+    """The dimension along x or y: by its CF attributes, or else by its name."""
     names = X_NAMES if axis == "x" else Y_NAMES
-    described: dict[str, list[Hashable]] = {"attributes": [], "name": []}
+    candidates: dict[str, list[Hashable]] = {"attributes": [], "name": []}
     for dimension in array.dims:
         attributes = array[dimension].attrs if dimension in array.coords else {}
         standard = str(attributes.get("standard_name", ""))
@@ -165,29 +169,29 @@ def _dimension(array: Any, axis: str, label: str) -> Hashable:
             or standard in names
             or str(attributes.get("units", "")).lower() in {f"{d}_{toward}" for d in DEGREES}
         ):
-            described["attributes"].append(dimension)
+            candidates["attributes"].append(dimension)
         if str(dimension).lower() in names:
-            described["name"].append(dimension)
-    for found in described.values():
-        if len(found) == 1:
-            return found[0]
+            candidates["name"].append(dimension)
+    for dimensions in candidates.values():
+        if len(dimensions) == 1:
+            return dimensions[0]
     raise MapError(
         f"{label} has the dimensions {', '.join(map(str, array.dims))}, of which "
-        f"{'none' if not described['name'] else 'more than one'} is known as {axis}; rename one to "
-        f"{axis!r}"
+        f"{'none' if not candidates['name'] else 'more than one'} is known as {axis}; rename one "
+        f"to {axis!r}"
     )
 
 
 def _plane(array: Any, x: Hashable, y: Hashable, which: int | str, label: str) -> Any:
-    """One band: dimensions of length 1 dropped, the remaining one counted from 1."""
+    """One band: dimensions of length 1 are dropped; the remaining one counts the bands, from 1."""
     rest = [dimension for dimension in array.dims if dimension not in {x, y}]
     for dimension in [d for d in rest if array.sizes[d] == 1 and d != "band"]:
         array = array.isel({dimension: 0})
         rest.remove(dimension)
     if len(rest) > 1:
         raise MapError(
-            f"{label} has the further dimensions {', '.join(map(str, rest))}; pick one map of it "
-            "first, as with .isel"
+            f"{label} has the further dimensions {', '.join(map(str, rest))}; select one map of "
+            "it first, as with .isel"
         )
     _require_band(which, array.sizes[rest[0]] if rest else 1, label)
     return array.isel({rest[0]: int(which) - 1}) if rest else array
@@ -228,12 +232,12 @@ def _crs(source: Any, array: Any, x: Hashable, y: Hashable) -> CRS | None:
 
 
 def _grid_of_transform(source: Any, array: Any, crs: CRS | None, label: str) -> Grid:
-    """Where an array without coordinates lies, as rioxarray writes it: a GeoTransform."""
+    """The grid of an array without coordinates, from the GeoTransform that rioxarray writes."""
     text = _mapping(source, array).get("GeoTransform")
     if text is None:
-        raise MapError(f"{label} has no coordinates along x and y; give it some")
+        raise MapError(f"{label} has no coordinates along x and y; add them")
     try:
         transform = Affine.from_gdal(*map(float, str(text).split()))
     except (TypeError, ValueError):
-        raise MapError(f"{label} has the GeoTransform {text!r}, which is none") from None
+        raise MapError(f"{label} has the GeoTransform {text!r}; it must be six numbers") from None
     return Grid(array.sizes[array.dims[0]], array.sizes[array.dims[1]], transform, crs)

@@ -1,4 +1,4 @@
-"""One band of a map, wherever it comes from, read by rows: in part, or coarser."""
+"""One band of a map from any source, read row by row: as a whole, in part, or coarser."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from ..surface.layers import Kind
 from ..surface.raster import Grid
 from ..validation import Array
 
-MARGIN = 8  # cells around a window: what lies beyond moves the spline by 1e-4 of itself
+MARGIN = 8  # cells around a window: values farther out change the spline by 1e-4, relative
 SAMPLED_STRIPS = 8
 SAMPLED_ROWS = 16
-LEAST_SHARE = 0.5  # of a coarse cell that must have data
-FEWEST_LEVELS = 16  # of distinct heights, from which their step can be told
-MOST_LOOKED_AT = 1_000_000  # heights that the step is sought in
+LEAST_SHARE = 0.5  # a coarse cell needs data in this share of its cells
+FEWEST_LEVELS = 16  # distinct heights that are needed to find their rounding step
+MOST_LOOKED_AT = 1_000_000  # heights that are searched for the rounding step
 
 
 @dataclass(frozen=True, eq=False)
 class Band(ABC):
     """A band: its grid, and how to read it.
 
-    label : for messages. unit : "" where unknown. step : what its numbers are rounded to,
-    where its type tells; 0 otherwise.
+    label : its name in messages. unit : "" where unknown. step : what its numbers are rounded to
+    where they are stored as integers; 0 otherwise.
     """
 
     grid: Grid
@@ -44,12 +44,12 @@ class Band(ABC):
 
     @property
     def rows_at_once(self) -> int:
-        """How many rows lie together in the file."""
+        """How many rows the file stores together in one block."""
         return 1
 
 
 class Part(NamedTuple):
-    """A layer on its way onto the map's grid."""
+    """A layer before it is brought onto the map's grid."""
 
     name: str
     kind: Kind
@@ -59,7 +59,7 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class View:
-    """A part of a band, perhaps coarser."""
+    """A part of a band to read: its rows and columns, and how much coarser."""
 
     band: Band
     rows: slice
@@ -68,33 +68,33 @@ class View:
 
     @classmethod
     def whole(cls, band: Band) -> View:
-        """All of it."""
+        """The whole band."""
         return cls(band, slice(0, band.grid.rows), slice(0, band.grid.columns))
 
     @property
     def grid(self) -> Grid:
-        """The cells that are seen."""
+        """The grid of the cells that are read."""
         window = self.band.grid.window(self.rows, self.columns)
         return window if self.factor == 1 else window.coarser(self.factor)
 
     def coarser(self, factor: int) -> View:
-        """The same part with cells ``factor`` times as large a side."""
+        """The same part with cells ``factor`` times as wide and as high."""
         return replace(self, factor=factor)
 
     def around(self, x: Array, y: Array) -> View | None:
-        """The part that holds points in the band's own coordinates; None where there is none."""
+        """The part around points in the band's own coordinates; None where they lie outside."""
         column, row = self.band.grid.cells(x, y)
         kept = []
-        for found, count in ((row, self.band.grid.rows), (column, self.band.grid.columns)):
-            first = max(0, math.floor(found.min() - MARGIN * self.factor))
-            last = min(count, math.ceil(found.max() + MARGIN * self.factor) + 1)
-            if first >= last or found.max() < -0.5 or found.min() > count - 0.5:
+        for index, count in ((row, self.band.grid.rows), (column, self.band.grid.columns)):
+            first = max(0, math.floor(index.min() - MARGIN * self.factor))
+            last = min(count, math.ceil(index.max() + MARGIN * self.factor) + 1)
+            if first >= last or index.max() < -0.5 or index.min() > count - 0.5:
                 return None
             kept.append(slice(first, last))
         return replace(self, rows=kept[0], columns=kept[1])
 
     def widened(self, margin: float) -> View:
-        """With so much more on every side, in the unit of the plane that the map is planned on."""
+        """The view with a margin added on every side, in the unit of the planning plane."""
         grid = self.band.grid
         rows, columns = grid.window(self.rows, self.columns).reach(margin)
         return replace(
@@ -106,20 +106,20 @@ class View:
         )
 
     def within(self, bounds: Bounds) -> View:
-        """The part inside a rectangle of the map's own coordinates, and a few cells more."""
+        """The part inside a rectangle of the map's own coordinates, and a few cells around it."""
         x = np.array([bounds.x1_min, bounds.x1_max] * 2)
         y = np.repeat([bounds.x2_min, bounds.x2_max], 2)
-        found = self.around(x, y)
-        if found is None:
+        part = self.around(x, y)
+        if part is None:
             extent = ", ".join(f"{value:.10g}" for value in self.band.grid.extent())
             raise MapError(
                 f"{tuple(bounds)} does not touch {self.band.label}, which covers ({extent}) "
                 "as (x_min, y_min, x_max, y_max); check the order and the CRS"
             )
-        return found
+        return part
 
     def require_size(self, most_cells: int) -> None:
-        """Raise MapError, before memory is taken, where too many cells are asked for."""
+        """Raise MapError where there are too many cells, before memory is allocated."""
         grid = self.grid
         if min(grid.rows, grid.columns) < 1:
             raise MapError(
@@ -136,7 +136,7 @@ class View:
             )
 
     def _strips(self) -> Iterator[tuple[int, Array]]:
-        """Rows of values with the index of the first, whole coarse cells together."""
+        """Blocks of rows, each with the index of its first; they do not cut a coarse cell."""
         width = self.columns.stop - self.columns.start
         unit = math.lcm(self.factor, self.band.rows_at_once)
         if unit * width > 8 * BLOCK:
@@ -149,7 +149,7 @@ class View:
             start = stop
 
     def sample(self) -> Array:
-        """Some rows of the band as it is, from all over the part."""
+        """Some rows of the band at full resolution, spread over the part."""
         width = self.columns.stop - self.columns.start
         count = self.rows.stop - self.rows.start
         wanted = min(count, max(SAMPLED_ROWS, BLOCK // width))
@@ -163,9 +163,9 @@ class View:
         )
 
     def read_as(self, target: Grid, out: Array) -> bool:
-        """Read into ``out`` where the target has the same cells, in either order of the rows.
+        """Read into ``out`` if the target has the same cells, with its rows in either order.
 
-        False, and nothing is read, where it has others.
+        Returns False, and reads nothing, if its cells are different.
         """
         grid = self.grid
         if grid.crs == target.crs and grid.is_same(target):
@@ -177,7 +177,7 @@ class View:
         return True
 
     def read_into(self, out: Array) -> None:
-        """Values of the grid's cells into ``out`` (rows, columns)."""
+        """Read the values of the grid's cells into ``out`` (rows, columns)."""
         for start, strip in self._strips():
             means = strip if self.factor == 1 else _block_means(strip, self.factor)
             first = start // self.factor
@@ -185,7 +185,7 @@ class View:
 
 
 def _block_means(values: Array, factor: int) -> Array:
-    """Means over blocks of cells with data; NaN where over half of a block has none."""
+    """Means over the cells with data of each block; NaN where over half of a block has none."""
     rows, columns = (size // factor for size in values.shape)
     cut = values[: rows * factor, : columns * factor]
     cells = cut.reshape(rows, factor, columns, factor)
@@ -197,21 +197,21 @@ def _block_means(values: Array, factor: int) -> Array:
 
 
 def quantisation_step(values: Array) -> float:
-    """The step that heights are rounded to; 0 where they are not, or it cannot be told.
+    """The step that heights are rounded to; 0 where they are not rounded, or it is not found.
 
-    values : any shape, NaN where unknown. Found where the gaps between all distinct values are
-    multiples of the smallest, to the precision of 32-bit numbers.
+    values : any shape, NaN where unknown. A step is found where all gaps between distinct values
+    are multiples of the smallest gap, to the precision of 32-bit numbers.
     """
     flat = values.reshape(-1)
     looked_at = flat[:: max(1, flat.size // MOST_LOOKED_AT)]
     levels = np.unique(looked_at[np.isfinite(looked_at)])
     if len(levels) < FEWEST_LEVELS:
         return 0.0
-    with np.errstate(over="ignore", invalid="ignore"):  # beyond 32 bits nothing is told
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond 32 bits no step is found
         rounding = float(np.spacing(np.float32(np.abs(levels).max())))
     gaps = np.diff(levels)
     gaps = gaps[gaps > 2.0 * rounding]
-    # Differences that 32-bit numbers can hardly hold are no step that anybody chose.
+    # Gaps near the precision of 32-bit numbers come from that precision, not from rounding.
     if len(gaps) < FEWEST_LEVELS - 1 or (least := float(gaps.min())) < 8.0 * rounding:
         return 0.0
     multiples = np.rint(gaps / least)

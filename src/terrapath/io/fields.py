@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from rasterio import Affine
@@ -17,15 +16,15 @@ from ..validation import Array
 
 
 def _north_up(field: DistanceField) -> tuple[Array, Affine]:
-    """Rows from north to south, NaN where not reached; nodes are the centres of cells."""
+    """Values with rows from north to south, NaN where not reached; nodes are cell centres."""
     lattice = field.lattice
     bounds, dx, dy = lattice.bounds, lattice.dx, lattice.dy
     values = np.where(np.isfinite(field.values), field.values, np.nan)[::-1]
     return values, Affine(dx, 0, bounds.x1_min - 0.5 * dx, 0, -dy, bounds.x2_max + 0.5 * dy)
 
 
-def _tags(field: DistanceField) -> dict[str, Any]:
-    """What the distances are measured from, and under which weights."""
+def _tags(field: DistanceField) -> dict[str, str | float]:
+    """The source of the distances and the weights of the layers, as tags of the file."""
     weights = {f"weight_{layer.name}": layer.weight for layer in field.surface.layers}
     source = {"source_x1": repr(field.source[0]), "source_x2": repr(field.source[1])}
     return {"software": f"terrapath {__version__}", **source, **weights}
@@ -37,7 +36,7 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
 
     values, transform = _north_up(field)
     reference, unit = field.surface.georeference, field.surface.unit
-    profile: dict[str, Any] = {
+    profile: dict[str, object] = {
         "driver": "GTiff",
         "width": values.shape[1],
         "height": values.shape[0],
@@ -49,7 +48,7 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
         "compress": "deflate",
         "predictor": 3,
     }
-    # By way of memory: GDAL does not tell of every failure to write, and may add a side file.
+    # In memory first: GDAL does not report every failure to write, and may add a side file.
     with MemoryFile() as memory:
         with memory.open(**profile) as dataset:
             dataset.write(values, 1)
@@ -60,7 +59,7 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
 
 
 def _write_npz(field: DistanceField, file: Path) -> None:
-    """As the lattice has it: values (ny, nx) at x (nx,) and y (ny,), infinite if not reached."""
+    """The lattice's own arrays: values (ny, nx) at x (nx,) and y (ny,), infinite if not reached."""
     reference = field.surface.georeference
     with file.open("wb") as stream:
         np.savez_compressed(
@@ -82,15 +81,15 @@ WRITERS: dict[str, Callable[[DistanceField, Path], None]] = {
 
 
 def require_known_format(path: Path) -> None:
-    """Raise MapError for an ending that no writer has."""
+    """Raise MapError for a file ending that stands for no known format."""
     if path.suffix.lower() not in WRITERS:
         raise MapError(f"output={str(path)!r} has no known format; end it in {', '.join(WRITERS)}")
 
 
 def write_field(field: DistanceField, path: str | Path) -> None:
-    """Write a distance field as .tif (GeoTIFF) or .npz, whole or not at all.
+    """Write a distance field as .tif (GeoTIFF) or .npz, completely or not at all.
 
-    In the GeoTIFF nodes are the centres of cells, and cells that were not reached hold no data.
+    In the GeoTIFF nodes are cell centres, and cells that were not reached are no-data.
     """
     target = Path(path)
     require_known_format(target)

@@ -1,4 +1,4 @@
-"""Maps as surfaces: from files, xarray and NumPy, with layers brought onto one grid."""
+"""Reads maps as surfaces, from files, xarray and NumPy, with all layers on one grid."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _TEXT = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?", 
 
 @dataclass(frozen=True)
 class LayerSource:
-    """Where a layer comes from: a band of a map, and the weight of its changes.
+    """Where a layer comes from: a band of a map, and the layer's weight.
 
     path : a file, an xarray DataArray or Dataset, or (values, x, y). band : its number, from
     1, or the name of a variable.
@@ -51,7 +51,7 @@ class LayerSource:
 
     @classmethod
     def parse(cls, text: str) -> LayerSource:
-        """FILE[:BAND][*WEIGHT]."""
+        """From text of the form FILE[:BAND][*WEIGHT]."""
         match = _TEXT.fullmatch(text)
         try:
             if match is None:
@@ -66,13 +66,13 @@ class LayerSource:
 
     @classmethod
     def of_file(cls, name: str, band: int = 1, weight: float = 1.0) -> LayerSource:
-        """A band of a file, or of what GDAL reads under a name."""
+        """A band of a file, or of another source that GDAL knows by this name."""
         require_not_negative(**{f"the weight of {name}": weight})
         return cls(_as_path(name), band, weight)
 
     @classmethod
     def of_heights(cls, source: Source, band: int | str) -> LayerSource:
-        """A band of a map, whose name is taken as it stands."""
+        """A band of a map; in its name, no band and no weight is looked for."""
         return cls(_as_path(source) if isinstance(source, str) else source, band)
 
     @classmethod
@@ -83,7 +83,7 @@ class LayerSource:
         if isinstance(source, str):
             return cls.parse(source)
         if isinstance(source, (Path, tuple)) or _is_xarray(source):
-            return cls(source)  # type: ignore[arg-type] # mypy does not see what xarray's are
+            return cls(source)  # type: ignore[arg-type] # mypy cannot see that it is xarray's
         shown = " ".join(repr(source).split())
         raise InputError(
             f"layer source {shown:.60} is not a path, FILE:BAND*WEIGHT, an xarray object or "
@@ -91,9 +91,9 @@ class LayerSource:
         )
 
     def open(self, files: ExitStack, crs: CRS | None, *, heights: bool) -> Band:
-        """The band, its file open until ``files`` are closed. crs : where the map has none.
+        """Open the band; its file stays open until ``files`` is closed.
 
-        heights : do its numbers have to be heights?
+        crs : the CRS of a map that has none. heights : must its numbers be heights?
         """
         if isinstance(self.band, bool) or not isinstance(self.band, (int, str)):
             raise InputError(
@@ -107,12 +107,12 @@ class LayerSource:
 
 
 def _as_path(text: str) -> Path | str:
-    """A Path, or the text where GDAL reads it as something else: a Path drops slashes."""
+    """A Path; or the text itself where GDAL reads it as something else, as a Path drops slashes."""
     return text if "://" in text or text.startswith("/vsi") else Path(text)
 
 
 def _is_xarray(source: object) -> bool:
-    """Is it an xarray object? Asked without importing xarray."""
+    """Is it an xarray object? Checked without importing xarray."""
     return type(source).__module__.split(".")[0] == "xarray"
 
 
@@ -146,16 +146,16 @@ def _band_of_netcdf(
 
 # x_min, y_min, x_max, y_max in the map's own coordinates.
 Rectangle: TypeAlias = tuple[float, float, float, float]
-# By its name.
+# The sources of layers, by the layers' names.
 Sources: TypeAlias = Mapping[str, LayerSource | Source]
 
-MOST_CELLS = 150_000_000  # of a map, 1.2 GB a layer
-STEEPEST_DEGREES = 10.0  # rms slope of heights above which small coordinates must be degrees
+MOST_CELLS = 150_000_000  # of a map; 1.2 GB for each layer
+STEEPEST_DEGREES = 10.0  # if the rms slope is above this, small coordinates must be degrees
 
 
 @dataclass(frozen=True, eq=False)
 class OpenMap:
-    """A map whose files are open; see ``open_map``. For one thread, as its files are."""
+    """A map whose files are open; see ``open_map``. Only for use in one thread."""
 
     heights: Part
     layers: Sources
@@ -184,7 +184,7 @@ class OpenMap:
         require_count(most=2**62, most_cells=most_cells)
         base = self._view(within, margin, decimate)
         base.require_size(most_cells)
-        # Heights of damaged files overflow: what comes of them is refused, or holds no data.
+        # Heights of damaged files may overflow. They are refused later, or become no-data.
         with gdal(), np.errstate(over="ignore", invalid="ignore"):
             target = base.grid.planning_grid()
             bands = self._read(base, target, most_cells)
@@ -202,7 +202,7 @@ class OpenMap:
         return replace(surface, source=self.heights.band.label)
 
     def _view(self, within: Rectangle | None, margin: float = 0.0, decimate: int = 1) -> View:
-        """What is read of the heights."""
+        """The part of the heights to read."""
         view = View.whole(self.heights.band).coarser(decimate)
         if within is not None:
             view = view.within(as_bounds(within, "within"))
@@ -211,7 +211,7 @@ class OpenMap:
 
     @cached_property
     def _parts(self) -> list[Part]:
-        """All layers, opened at their first need, each with a CRS or on the heights' cells."""
+        """All layers, opened when first needed; each has a CRS, or the cells of the heights."""
         given: list[tuple[Kind, str, LayerSource | Source]] = [
             *(("rise", *item) for item in self.layers.items()),
             *(("cost", *item) for item in self.costs.items()),
@@ -240,7 +240,7 @@ class OpenMap:
         return read_all(self._parts, base, target, most_cells)
 
     def _into_plane_unit(self, heights: Array, target: Grid) -> tuple[float, str]:
-        """Bring heights into the plane's unit: the factor, and the unit that they have then."""
+        """Convert heights to the plane's unit, in place; returns the factor and the new unit."""
         if target.crs is None:
             _require_no_degrees(heights, target, self.heights.band.label)
         plane = "" if target.crs is None else Georeference(target.crs, target.crs).unit
@@ -261,11 +261,11 @@ def open_map(
     smoothing: float | str | None = "auto",
     crs: CRS | str | int | None = None,
 ) -> Iterator[OpenMap]:
-    """Open a map, to count its cells and to read surfaces of it: the whole, parts, coarser ones.
+    """Open a map, to count its cells and to read surfaces of it: of the whole, in part, coarser.
 
-    The heights are opened at once, further layers with the first surface, each once. What is
-    asked for is described by ``read_surface``. Raises MapError or InputError with the file, the
-    value and the remedy.
+    The heights are opened at once. Further layers are opened once, for the first surface. See
+    ``read_surface`` for the arguments. Raises MapError or InputError with the file, the value and
+    the remedy.
     """
     require_not_negative(fill_holes=fill_holes)
     given = parse_crs(crs, f"crs={crs!r}")
@@ -284,12 +284,12 @@ def open_map(
 
 
 def _into_plane_unit(unit: str, plane: str) -> tuple[float, str]:
-    """The factor that brings heights into the plane's unit, and the unit they have then."""
+    """The factor that converts heights to the plane's unit, and their unit after that."""
     theirs, ours = metres_of(unit), metres_of(plane)
     if theirs is None or ours is None:
         return 1.0, unit or plane
     factor = theirs / ours
-    # Metres stay as they are, to the bit.
+    # Where the units are the same, the heights must keep every bit.
     return (1.0 if abs(factor - 1.0) < 1e-12 else factor), plane
 
 
@@ -308,17 +308,17 @@ def _require_no_degrees(heights: Array, grid: Grid, label: str) -> None:
 
 
 def _scale(smoothing: float | str | None, view: View, cell: float, factor: float) -> float | None:
-    """The length scale of the smoothing, map units; factor : from the band's unit to theirs."""
+    """The length scale of the smoothing, map units. factor : heights to the plane's unit."""
     if not isinstance(smoothing, str):
         return None if smoothing is None else smoothing * 1.0
     if smoothing != "auto":
-        raise InputError(f"smoothing={smoothing!r} is no length; give map units, 'auto' or None")
+        raise InputError(f"smoothing={smoothing!r} is not a length; give map units, 'auto' or None")
     step = view.band.step or quantisation_step(view.sample())
     if step == 0.0:
         return None
     from ..surface.smoothing import scale_for_step
 
-    # Means over blocks of cells are that much finer.
+    # Means over blocks of cells are rounded to a finer step.
     return scale_for_step(step * factor / view.factor, cell) or None
 
 
@@ -340,20 +340,22 @@ def read_surface(
 
     source : anything GDAL reads, an xarray DataArray or Dataset, or (values, x, y).
     height_band : its band of heights, 1-based, or the name of a variable.
-    layers, costs : name -> LayerSource, path, array or text FILE[:BAND][*WEIGHT]; brought onto
-    the grid of the heights. The change of a layer costs, or the level of a cost, above 0.
-    fill_holes : the longest side, map units of the plane, of holes that are filled; cells
-    without data in any layer are blocked else.
-    smoothing : standard deviation, map units; "auto": the least that heights rounded to a
-    step need, none where they are not; None or 0: none.
-    crs : where the map has none. within : (x_min, y_min, x_max, y_max) in the map's own
-    coordinates; only that is read. margin : so much more around it, map units of the plane: what
-    lies beyond is not seen, and a vehicle's radius reaches over the edge. decimate : means over
-    so many cells a side are read. most_cells : a map with more is refused before memory is taken.
+    layers, costs : name -> LayerSource, path, array or text FILE[:BAND][*WEIGHT]; resampled to
+    the grid of the heights. A change of one of ``layers`` costs. The value of one of ``costs``
+    multiplies lengths, and must be above 0.
+    fill_holes : holes up to this side are filled, map units of the plane; all other cells
+    without data in any layer are blocked.
+    smoothing : standard deviation, map units. "auto": where heights are rounded to a step, the
+    least smoothing that they need, otherwise none. None or 0: none.
+    crs : the CRS of a map that has none. within : (x_min, y_min, x_max, y_max) in the map's own
+    coordinates; only this part is read. margin : how much more is read around it, map units of
+    the plane. A vehicle's radius reaches over the edge, and ground that is not read cannot block
+    it. decimate : means over blocks of this many cells a side are read. most_cells : a map with
+    more cells is refused before memory is allocated.
 
-    A map in degrees, or turned, is brought onto a local projection in metres; heights are
-    brought into the plane's unit. Raises MapError or InputError with the file, the value and
-    the remedy.
+    A map in degrees, or a rotated one, is projected to a local projection in metres. Heights are
+    converted to the plane's unit. Raises MapError or InputError with the file, the value and the
+    remedy.
     """
     with open_map(
         source,

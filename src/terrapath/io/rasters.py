@@ -1,4 +1,4 @@
-"""Bands of whatever GDAL reads."""
+"""Bands of rasters in any format that GDAL reads."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .bands import Band
 MOST_BLOCK_BYTES = 2 * 2**30
 SECONDS_FOR_NETWORK = 30
 
-# What a variable of heights is called, the likeliest first.
+# Names of variables that hold heights, the likeliest first.
 HEIGHT_NAMES = (
     "height", "heights", "elevation", "elev", "dem", "dtm", "altitude", "orog", "topo",
     "topography", "surface_altitude", "band1", "z",
@@ -32,14 +32,14 @@ HEIGHT_NAMES = (
 
 @contextmanager
 def gdal() -> Iterator[None]:
-    """GDAL for this thread; what it has to say is logged, and what matters comes as an error.
+    """Prepare GDAL for this thread: its messages are logged, and its errors are raised.
 
-    Datasets are of one thread, too: each call opens its own.
+    A dataset belongs to one thread too, so each call opens its own.
     """
     import rasterio
     from rasterio.env import get_gdal_config, set_gdal_config
 
-    # Not as an option of the Env: in the main thread that is the process's, and comes and goes.
+    # Not an option of the Env: in the main thread that would change the whole process for a while.
     if get_gdal_config("GDAL_HTTP_TIMEOUT") is None:
         set_gdal_config("GDAL_HTTP_TIMEOUT", SECONDS_FOR_NETWORK)
     with rasterio.Env():
@@ -48,23 +48,23 @@ def gdal() -> Iterator[None]:
 
 @contextmanager
 def reading(path: str | Path, *, is_file: bool = True) -> Iterator[None]:
-    """Turn what goes wrong inside into one line that names the file, or the array."""
+    """Turn any error of the ``with`` block into a MapError that names the file or the array."""
     try:
         yield
     except TerrapathError:
         raise
-    except Exception as error:  # damaged files raise whatever GDAL, rasterio or NumPy do
+    except Exception as error:  # for damaged files GDAL, rasterio and NumPy raise any type
         raise _unreadable(path, error, is_file=is_file) from None
 
 
 def _unreadable(path: str | Path, error: Exception, *, is_file: bool) -> MapError:
-    # Asked only now: GDAL also reads names that are no paths, as in /vsizip/ or netcdf:.
+    # Checked only after an error: GDAL also reads names that are no paths, as in /vsizip/.
     if is_file and not _may_be_no_path(str(path)) and not _exists(path):
         return MapError(f"{path} does not exist; check the path")
-    # Rasterio puts the reason into the cause: its own message only points there.
+    # Rasterio's own message only refers to the cause, which holds the reason.
     reason = " ".join(str(error.__cause__ or error).split()).rstrip(".") or type(error).__name__
     return MapError(
-        f"{path} cannot be read as a raster: {reason:.300}; check that it is one, and whole"
+        f"{path} cannot be read as a raster: {reason:.300}; check that it is one, and complete"
     )
 
 
@@ -89,7 +89,7 @@ class FileBand(Band):
 
     @property
     def rows_at_once(self) -> int:
-        """Rows of a block."""
+        """How many rows the file stores together in one block."""
         return int(self.dataset.block_shapes[self.number - 1][0])
 
     def read(self, rows: slice, columns: slice) -> Array:
@@ -117,7 +117,7 @@ def open_band(
 ) -> FileBand:
     """A band of a file, or of its subdataset; the dataset is closed with the stack ``files``.
 
-    number : the band, 1-based, or the name of a variable. crs : where the file has none.
+    number : the band, 1-based, or the name of a variable. crs : the CRS of a file that has none.
     """
     with reading(path):
         dataset = files.enter_context(_open(path))
@@ -139,9 +139,9 @@ def open_band(
 
 
 def classic_netcdf(path: str | Path) -> tuple[Path, str | None] | None:
-    """(file, variable or None) where a name is of a netCDF file of the classic format.
+    """(file, variable or None) if a name is of a netCDF file of the classic format, else None.
 
-    The netCDF library that GDAL reads those with crashes on damaged ones, and takes long.
+    GDAL's netCDF library is slow to load, and crashes on damaged files of this format.
     """
     match = re.fullmatch(r'(?i:netcdf):"?(.+?)"?(?::([^:"]+))?', str(path))
     name, variable = (match[1], match[2]) if match else (str(path), None)
@@ -157,7 +157,7 @@ def open_classic_netcdf(path: Path, files: Any) -> Any:
     require_packages(f"{path}, netCDF of the classic format,", "xarray")
     import xarray
 
-    # Of attributes that contradict one another; where it matters, values are missing.
+    # It warns of attributes that contradict one another. Where this matters, values are missing.
     silence(xarray.SerializationWarning, "xarray.conventions")
     with reading(path):
         return files.enter_context(
@@ -166,7 +166,7 @@ def open_classic_netcdf(path: Path, files: Any) -> Any:
 
 
 def _open(path: str | Path) -> Any:
-    """The dataset, by way of credentials where the name asks for them, as in s3:."""
+    """Open a dataset, with credentials where its name needs them, as in s3:."""
     from rasterio.env import ensure_env_with_credentials
     from rasterio.errors import NotGeoreferencedWarning
 
@@ -175,9 +175,10 @@ def _open(path: str | Path) -> Any:
 
 
 def _dataset(path: str | Path) -> Any:
-    """As ``rasterio.open``, but what that warns of is then said of this module, not of its own.
+    """As ``rasterio.open``, but Python attributes its warnings to this module.
 
-    So those who open datasets themselves still hear of missing georeferences.
+    So they can be silenced here alone: callers who open datasets themselves are still warned of
+    missing georeferences.
     """
     from rasterio.io import DatasetReader
 
@@ -185,22 +186,22 @@ def _dataset(path: str | Path) -> Any:
 
 
 def _variable(path: str | Path, dataset: Any, name: str | None) -> str:
-    """The subdataset of a variable: the named one, the only one, or what heights are called."""
-    found = {
+    """The subdataset of a variable: the named one, else the only one, else one of heights."""
+    variables = {
         subdataset.rsplit(":", 1)[-1].strip('"/'): subdataset for subdataset in dataset.subdatasets
     }
-    if name is not None and name in found:
-        return str(found[name])
-    if name is None and len(found) == 1:
-        return str(next(iter(found.values())))
-    likely = [key for key in HEIGHT_NAMES if key in found]
+    if name is not None and name in variables:
+        return str(variables[name])
+    if name is None and len(variables) == 1:
+        return str(next(iter(variables.values())))
+    likely = [key for key in HEIGHT_NAMES if key in variables]
     if name is None and likely:
-        return str(found[likely[0]])
-    if not found:
+        return str(variables[likely[0]])
+    if not variables:
         what = "holds no raster" if dataset.count == 0 else "has bands, no variables"
         raise MapError(f"{path} {what}; name a band of it by its number")
-    asked = f"variable {name!r} is not in {path}" if name else f"{path} holds several variables"
-    raise MapError(f"{asked}; name one of: {', '.join(found)}")
+    fault = f"variable {name!r} is not in {path}" if name else f"{path} holds several variables"
+    raise MapError(f"{fault}; name one of: {', '.join(variables)}")
 
 
 def _require_band(path: str | Path, dataset: Any, number: int) -> None:
@@ -213,7 +214,7 @@ def _require_band(path: str | Path, dataset: Any, number: int) -> None:
 
 
 def _require_heights(path: str | Path, dataset: Any, number: int, heights: bool) -> None:
-    """Numbers of one real kind, no picture, in blocks that fit into memory."""
+    """Raise MapError unless a band holds real numbers, not colours, in blocks of moderate size."""
     from rasterio.enums import ColorInterp
 
     kind = np.dtype(dataset.dtypes[number - 1])
@@ -228,8 +229,8 @@ def _require_heights(path: str | Path, dataset: Any, number: int, heights: bool)
     rows, columns = dataset.block_shapes[number - 1]
     if int(rows) * int(columns) * kind.itemsize > MOST_BLOCK_BYTES:
         raise MapError(
-            f"{path} lies in blocks of {columns:,} x {rows:,} cells, too large to read; rewrite it "
-            "in tiles first"
+            f"{path} is stored in blocks of {columns:,} x {rows:,} cells, too large to read; "
+            "rewrite it in tiles first"
         )
 
 
@@ -240,48 +241,49 @@ def _unit(dataset: Any, number: int) -> str:
         return unit or ""
     try:
         full = CRS.from_user_input(dataset.crs)
-    except Exception:  # what is wrong with it is said where the grid is made
+    except Exception:  # ``_grid`` reports what is wrong with the CRS
         return ""
     return str(full.axis_info[2].unit_name) if len(full.axis_info) > 2 else ""
 
 
 def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
-    """Where the cells lie; a file that does not say has cells of side 1, north up."""
-    found = parse_crs(dataset.crs, f"the CRS of {path}")
+    """The grid of the cells; a file without a position has cells of side 1, north up."""
+    own_crs = parse_crs(dataset.crs, f"the CRS of {path}")
     transform = dataset.transform
     if transform.is_identity:
-        _require_place_may_lack(path, dataset)
+        _require_no_other_position(path, dataset)
         transform = Affine(1.0, 0.0, 0.0, 0.0, -1.0, float(dataset.height))
     determinant = transform.a * transform.e - transform.b * transform.d
     if not (np.isfinite(list(transform)).all() and determinant != 0.0):
         raise MapError(
-            f"{path} has the geotransform {tuple(transform)[:6]}, which is none; check the file"
+            f"{path} has the geotransform {tuple(transform)[:6]}, which is not valid; check the "
+            "file"
         )
-    return Grid(dataset.height, dataset.width, transform, with_crs(found, crs, path))
+    return Grid(dataset.height, dataset.width, transform, with_crs(own_crs, crs, path))
 
 
-def _require_place_may_lack(path: str | Path, dataset: Any) -> None:
-    """Raise MapError where a place is described, but not one that GDAL makes a grid of."""
+def _require_no_other_position(path: str | Path, dataset: Any) -> None:
+    """Raise MapError where a file gives its position, but not as a regular grid."""
     if dataset.gcps[0] or dataset.rpcs:
         raise MapError(
-            f"{path} is placed by ground control points or camera coefficients only; bring it "
-            "onto a grid first (gdalwarp)"
+            f"{path} has its position from ground control points or camera coefficients only; "
+            "warp it to a grid first (gdalwarp)"
         )
     if dataset.driver in {"netCDF", "HDF5", "HDF5Image"}:
         raise MapError(
             f"GDAL does not find in {path} where its cells lie: the coordinates lack a "
-            "standard_name or units, or do not go in equal steps; open it with "
-            "xarray.open_dataset and give that"
+            "standard_name or units, or are not in equal steps; open it with "
+            "xarray.open_dataset and give the dataset instead"
         )
 
 
-def with_crs(found: CRS | None, given: CRS | None, label: object) -> CRS | None:
-    """The CRS that a map has, or the one that is given for it; they must not contradict."""
-    if found is None or given is None:
-        return found or given
-    if not found.equals(given, ignore_axis_order=True):
+def with_crs(own: CRS | None, given: CRS | None, label: object) -> CRS | None:
+    """The map's own CRS, or the one that is given for it; they must not contradict."""
+    if own is None or given is None:
+        return own or given
+    if not own.equals(given, ignore_axis_order=True):
         raise MapError(
-            f"crs={given.name} contradicts {label}, which is in {found.name}; leave it out, or "
+            f"crs={given.name} contradicts {label}, which is in {own.name}; leave it out, or "
             "bring the map into that CRS first"
         )
-    return found
+    return own

@@ -30,11 +30,11 @@ def _draw_height(axes: Any, path: Path) -> None:
     axes.set_ylabel(with_unit(height.name, height.unit))
 
 
-def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None) -> None:
-    """The slope along the path, signed, and the ground's steepest slope on both sides of zero."""
+def _draw_slopes(axes: Any, distance: Array, slope: Slopes, limit: float | None) -> None:
+    """The signed slope along the path, and the ground's steepest slope on both sides of zero."""
     band = {"color": GROUND_COLOUR, "alpha": 0.35, "lw": 0}
-    axes.fill_between(distance, -found.ground, found.ground, label="of the ground", **band)
-    axes.plot(distance, found.along, color=PATH_COLOUR, lw=1.0, label="along the route")
+    axes.fill_between(distance, -slope.ground, slope.ground, label="of the ground", **band)
+    axes.plot(distance, slope.along, color=PATH_COLOUR, lw=1.0, label="along the route")
     axes.axhline(0.0, color="black", lw=0.6)
     if limit is not None:
         style = {"color": LIMIT_COLOUR, "ls": "--", "lw": 1.2}
@@ -43,7 +43,7 @@ def _draw_slopes(axes: Any, distance: Array, found: Slopes, limit: float | None)
     axes.set_ylabel("slope (degrees)")
     axes.legend(fontsize=8, loc="upper right", ncols=3, framealpha=0.85)
     low, high = axes.get_ylim()
-    # Leaves space for the limit's line below, and for the legend above.
+    # Leave space for the line of the limit below, and for the legend above.
     axes.set_ylim(low - 0.04 * (high - low), high + 0.25 * (high - low))
 
 
@@ -66,7 +66,7 @@ def _mark_vias(axes: Any, solution: Solution, path: Path) -> None:
 
 
 def draw_charts(figure: Any, solution: Solution, path: Path) -> None:
-    """Panels under each other with one axis of distance."""
+    """Draw panels below one another that share one axis of distance."""
     problem, distance = solution.problem, path.profile.distance
     more = further_layers(path)
     ratios = [HEIGHT_PANEL, SLOPE_PANEL, *[LAYER_PANEL] * len(more)]

@@ -1,4 +1,4 @@
-"""A fan of geodesics in the plane, and how far its rays' ends move with their direction."""
+"""A fan of geodesics in the plane, and how far the ends of its rays move as they turn."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_RAYS_DRAWN = 800
 
 
 def draw_fan(axes: Any, problem: Problem, fan: Fan, shortest: Array) -> None:
-    """Rays green, those that pass near the goal blue, the shortest geodesic red.
+    """Draw rays green, those that pass near the goal blue, the shortest geodesic red.
 
     shortest : (m, 2), the shortest geodesic that ends at the goal, map units.
     """
@@ -46,9 +46,10 @@ def draw_fan(axes: Any, problem: Problem, fan: Fan, shortest: Array) -> None:
 def draw_movement_fan(
     axes: Any, problem: Problem, rays: Sequence[Ray], movement: Array, pair: Sequence[Ray]
 ) -> None:
-    """Rays coloured by how far their ends move, (n,), map units per radian; the largest on top.
+    """Draw rays coloured by the movement of their ends (n,), map units per radian.
 
-    pair : two rays of nearly the same direction that part, drawn over the others.
+    Rays with the largest movement are on top. pair : two rays with nearly the same direction that
+    end far apart; they are drawn over the others.
     """
     draw_ground(axes, problem, PALE)
     shown = np.arange(0, len(rays), -(-len(rays) // MOST_RAYS_DRAWN))
@@ -65,32 +66,34 @@ def draw_movement_fan(
     apart = np.degrees(pair[-1].angle - pair[0].angle)
     label = f"two rays {apart:.2g} degrees apart"
     for k, (ray, colour) in enumerate(zip(pair, PAIR_COLOURS, strict=True)):
-        style = {"lw": 2.0, "zorder": 4, "label": label if k == 0 else "and the other"}
+        style = {"lw": 2.0, "zorder": 4, "label": label if k == 0 else "the second of them"}
         axes.plot(*ray.points.T, color=colour, **style)
     draw_ends(axes, problem)
     axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
-    label = "movement of the end (map units a radian)"
+    label = "movement of the end (map units per radian)"
     axes.figure.colorbar(colours, ax=axes, label=label, shrink=0.72, pad=0.02, extend="both")
 
 
 def draw_movement(axes: Any, angles: Array, movement: Array, length: float, exact: Array) -> None:
-    """End-point movement by direction, on a logarithmic scale.
+    """Draw the movement of the end against the initial direction, on a logarithmic scale.
 
-    angles : (n,), radians. movement : (n,), map units per radian. length : of the rays, which
-    is their movement on flat ground. exact : (k,), directions of the geodesics that end at
-    the goal, the shortest first, radians.
+    angles : (n,), radians. movement : (n,), map units per radian. length : of the rays; on flat
+    ground it equals their movement. exact : (k,), directions of the geodesics that end at the
+    goal, the shortest first, radians.
     """
     degrees = np.degrees(angles)
     style: dict[str, Any] = {"lw": 0.7, "color": "black", "zorder": 3}
     axes.semilogy(degrees, movement, label="movement of the end", **style)
     axes.axhline(length, color=RAY_COLOUR, ls="--", lw=1.2, label="on flat ground")
     hits = np.degrees(exact[(exact >= angles[0]) & (exact <= angles[-1])])
-    style = {"ms": 9, "color": NEAR_COLOUR, "label": "directions that hit the goal"}
+    style = {"ms": 9, "color": NEAR_COLOUR, "label": "directions that reach the goal"}
     axes.plot(hits, np.full(len(hits), 0.02), "|", transform=axes.get_xaxis_transform(), **style)
-    axes.axvline(np.degrees(exact[0]), color=PATH_COLOUR, lw=1.4, label="the shortest path's")
+    axes.axvline(
+        np.degrees(exact[0]), color=PATH_COLOUR, lw=1.4, label="direction of the shortest path"
+    )
     axes.set(
         xlabel="initial direction (degrees)",
-        ylabel="movement of the end (map units a radian)",
+        ylabel="movement of the end (map units per radian)",
         xlim=(degrees[0], degrees[-1]),
         ylim=(1.0, 6.0 * movement.max()),
     )

@@ -21,7 +21,7 @@ HATCH = "////"
 
 
 def _as_problem(field: DistanceField) -> Problem:
-    """The ground of a field, as a problem that starts and ends at its source."""
+    """The ground of a field, as a problem whose start and goal are the field's source."""
     if field.problem is not None:
         return field.problem
     space, nodata = field.free_space, field.surface.nodata
@@ -31,7 +31,7 @@ def _as_problem(field: DistanceField) -> Problem:
 
 
 def _draw_lines(axes: Any, field: DistanceField, values: Array, unit: str) -> None:
-    """Lines of equal distance, labelled."""
+    """Draw lines of equal distance, with labels."""
     lattice = field.lattice
     ticks = MaxNLocator(LINES, steps=[1, 2, 5, 10]).tick_values(0.0, float(values.max()))
     levels = [level for level in ticks if level > 0.0]
@@ -57,7 +57,7 @@ def _hatch(axes: Any, field: DistanceField) -> None:
 
 
 def draw_distances(axes: Any, field: DistanceField) -> None:
-    """Draw a field onto two-dimensional axes; regions that were not reached are hatched."""
+    """Draw a field on two-dimensional axes; regions that were not reached are hatched."""
     problem = _as_problem(field)
     draw_ground(axes, problem, PALE, contours=False)
     values = np.ma.masked_invalid(field.values)
@@ -65,5 +65,5 @@ def draw_distances(axes: Any, field: DistanceField) -> None:
     if values.count() and values.max() > 0.0:
         _draw_lines(axes, field, values, problem.surface.unit)
     draw_start(axes, problem)
-    if len(axes.get_legend_handles_labels()[1]) > 1:  # more than the start needs a word
+    if len(axes.get_legend_handles_labels()[1]) > 1:  # not only the start has an entry
         axes.legend(loc="upper left", fontsize=8, framealpha=0.85).set_zorder(7)

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 from ..io.routes.profile import clean
 from ..problem import Problem
 
-# Axes that are longer are in kilometres, metres.
+# Longer axes are in kilometres; metres.
 LONGEST_IN_METRES = 10_000.0
 
 
 def in_words(text: str) -> str:
-    """A name from a map, for matplotlib, where plain dollar signs would start mathematics."""
+    """A name from a map for matplotlib, which would read plain dollar signs as mathematics."""
     return clean(text).replace("$", r"\$")
 
 
@@ -27,19 +27,19 @@ def format_length(length: float, unit: str) -> str:
 
 
 class AxisUnit(NamedTuple):
-    """The unit that an axis of lengths is in."""
+    """The unit of an axis of lengths."""
 
     name: str
     size: float  # map units
 
     @classmethod
     def for_lengths(cls, longest: float, unit: str) -> AxisUnit:
-        """Kilometres where metres would be long, else the map's unit."""
+        """Kilometres where numbers in metres would be long, else the map's unit."""
         is_long = unit == "m" and longest >= LONGEST_IN_METRES
         return cls("km", 1000.0) if is_long else cls(unit, 1.0)
 
     def format(self, length: float, place: int | None = None) -> str:
-        """A number of the axis, its length given in map units; ``place`` is matplotlib's."""
+        """The number that the axis shows for a length in map units; matplotlib gives ``place``."""
         return f"{length / self.size:g}"
 
     def label(self, name: str) -> str:
@@ -47,13 +47,13 @@ class AxisUnit(NamedTuple):
         return f"{name} ({self.name})" if self.name else name
 
     def apply(self, axis: Any) -> None:
-        """Show the numbers of an axis in map units in this unit instead."""
+        """Show the numbers of an axis in this unit instead of map units."""
         if self.size != 1.0:
             axis.set_major_formatter(self.format)
 
 
 def label_axes(axes: Any, problem: Problem) -> None:
-    """Axis labels with units; kilometres where metres would be long."""
+    """Label both axes with units; kilometres where numbers in metres would be long."""
     longer = max(problem.bounds.width, problem.bounds.height)
     shown = AxisUnit.for_lengths(longer, problem.surface.unit)
     for axis in (axes.xaxis, axes.yaxis):

@@ -1,4 +1,4 @@
-"""The plane from above: shaded map, contours, obstacles, tree and path."""
+"""The map from above: shaded ground, contours, obstacles, tree and path."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from shapely import LineString, Point, Polygon
 from ..problem import Problem, Solution
 from ..space.free_space import Parts, sort_obstacles
 from .labels import format_length, label_axes
-from .terrain import LAYER_COLOURS, Terrain, height_colours
+from .terrain import LAYER_COLOURS, Cells, Terrain, height_colours
 
 SAMPLES = 500
 CONTOURS = 14
 LAYER_CONTOURS = 5
-# In samples: without it the steps of a quantised layer draw a maze instead of contours.
+# In samples. Without it, contours of a layer with rounded values would follow every step of it.
 LAYER_SMOOTHING = 8.0
 PATH_COLOUR = "#e4002b"
-# Of the next best routes; further ones are not drawn.
+# Colours of the next best routes; more of them are not drawn.
 ALTERNATIVE_COLOURS = ("#0b3dff", "#8a2be2", "#d95f02", "#00868b", "#6b4226")
 MARKS = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
 OBSTACLE_STYLE: dict[str, Any] = {"facecolor": "#3b3b3b", "edgecolor": "black", "linewidth": 0.8}
-# Overlapping margins are drawn as one where they have no more corners.
+# Overlapping margins are joined before drawing, unless they have more corners than this.
 MOST_JOINED = 100_000
 OBSTACLE_COLOUR = (0.23, 0.23, 0.23, 0.9)
 MARGIN_COLOUR = (0.23, 0.23, 0.23, 0.35)
@@ -50,7 +50,7 @@ def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain) -> None:
         parts = [part for part in shapely.get_parts(constraints.outside) if not part.is_empty]
         patches = PatchCollection(map(_outline, parts), zorder=2.9, linewidth=0.8, **OUTSIDE_STYLE)
         axes.add_collection(patches)
-        _explain(axes, "outside keep-in", OUTSIDE_STYLE["facecolor"], "#606060")
+        _explain(axes, "outside the keep-in area", OUTSIDE_STYLE["facecolor"], "#606060")
     if terrain.steep.any():
         _tint(axes, problem, terrain.steep, STEEP_COLOUR)
         _explain(axes, f"steeper than {problem.max_slope:g}°", STEEP_COLOUR)
@@ -60,7 +60,7 @@ def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain) -> None:
 
 
 def _draw_solid(axes: Any, parts: Parts) -> None:
-    """Geometries and discs as they were given."""
+    """Draw geometries and discs as they were given."""
     patches = [_outline(g) for g in parts.geometries if isinstance(g, Polygon)]
     discs = [Disc((c.x1, c.x2), c.radius) for c in parts.circles]
     axes.add_collection(PatchCollection([*patches, *discs], zorder=3, **OBSTACLE_STYLE))
@@ -72,7 +72,7 @@ def _draw_solid(axes: Any, parts: Parts) -> None:
 
 
 def _draw_margins(axes: Any, problem: Problem, terrain: Terrain) -> None:
-    """Draw the ground within the vehicle's radius of an obstacle, in one tone."""
+    """Tint the ground that is within the vehicle's radius of an obstacle."""
     if problem.radius == 0.0:
         return
     space = problem.free_space
@@ -95,13 +95,13 @@ def _draw_margins(axes: Any, problem: Problem, terrain: Terrain) -> None:
         _explain(axes, label, MARGIN_COLOUR)
 
 
-def _tint(axes: Any, problem: Problem, cells: Any, colour: tuple[float, ...]) -> None:
+def _tint(axes: Any, problem: Problem, cells: Cells, colour: tuple[float, ...]) -> None:
     shown = np.where(cells[..., None], colour, 0.0)
     axes.imshow(shown, extent=_extent(problem), origin="lower", zorder=2.8)
 
 
 def _explain(axes: Any, text: str, colour: Any, edge: Any = "none") -> None:
-    """An entry of the legend for a tone of the map."""
+    """Add an entry for a colour of the map to the legend."""
     axes.plot([], [], "s", color=colour, ms=9, markeredgecolor=edge, label=text)
 
 
@@ -111,7 +111,7 @@ def _extent(problem: Problem) -> tuple[float, float, float, float]:
 
 
 def _draw_contours(axes: Any, terrain: Terrain) -> None:
-    """Heights in black, the second layer, where there is one, in its colours."""
+    """Draw contours: heights in black, and the second layer, if there is one, in its colours."""
     heights, *others = terrain.values
     if np.ptp(heights) > 0.0:
         style = {"colors": "black", "linewidths": 0.45, "alpha": 0.45, "linestyles": "solid"}
@@ -141,10 +141,10 @@ def _draw_path(axes: Any, solution: Solution) -> None:
     halo = [patheffects.withStroke(linewidth=4.6, foreground="white")]
     if solution.path is not None:
         straight = np.array([problem.start, problem.goal])
-        # White shows on dark ground; the outline, on bright ground and in the legend.
+        # White is visible on dark ground; the outline is, on bright ground and in the legend.
         outline = [patheffects.withStroke(linewidth=3.2, foreground="#303030")]
         style = {"color": "white", "lw": 1.6, "ls": (0, (4, 3)), "path_effects": outline}
-        axes.plot(*straight.T, zorder=4, label="straight", **style)
+        axes.plot(*straight.T, zorder=4, label="straight line", **style)
         _draw_alternatives(axes, solution)
         axes.plot(
             *solution.path.points.T,
@@ -159,7 +159,7 @@ def _draw_path(axes: Any, solution: Solution) -> None:
 
 
 def _draw_alternatives(axes: Any, solution: Solution) -> None:
-    """The next best routes, thin and dashed, their lengths in the legend."""
+    """Draw the next best routes, thin and dashed, with their lengths in the legend."""
     halo = [patheffects.withStroke(linewidth=2.8, foreground="white", alpha=0.8)]
     for path, colour in zip(solution.alternatives, ALTERNATIVE_COLOURS, strict=False):
         style = {"color": colour, "lw": 1.5, "ls": (0, (5, 2)), "path_effects": halo}
@@ -168,20 +168,20 @@ def _draw_alternatives(axes: Any, solution: Solution) -> None:
 
 
 def draw_ends(axes: Any, problem: Problem) -> None:
-    """Start and goal."""
+    """Draw the start and the goal."""
     draw_start(axes, problem)
     axes.plot(*problem.goal, "*", color="#ffb000", ms=15, label="goal", **MARKS)
 
 
 def draw_start(axes: Any, problem: Problem) -> None:
-    """The start alone."""
+    """Draw the start alone."""
     axes.plot(*problem.start, "o", color="#0b6e4f", ms=9, label="start", **MARKS)
 
 
 def draw_ground(
     axes: Any, problem: Problem, opacity: float = 1.0, *, contours: bool = True
 ) -> Terrain:
-    """The region without a route: shade, contours, obstacles, limits and labels."""
+    """Draw the region without a route: shaded ground, contours, obstacles, limits and labels."""
     terrain = Terrain.sample(problem, SAMPLES)
     style = {"extent": _extent(problem), "origin": "lower", "interpolation": "bilinear"}
     axes.imshow(terrain.shaded(0), alpha=opacity, **style)
@@ -194,7 +194,7 @@ def draw_ground(
 
 
 def draw_map(axes: Any, solution: Solution) -> None:
-    """Draw everything onto two-dimensional axes."""
+    """Draw ground, tree and path on two-dimensional axes."""
     terrain = draw_ground(axes, solution.problem)
     _draw_tree(axes, solution)
     _draw_path(axes, solution)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 from matplotlib.colors import to_hex
 
@@ -25,31 +26,31 @@ from .terrain import LAYER_COLOURS, Terrain, height_colours
 ENDING = ".html"
 SAMPLES = 300  # of the terrain, along the longer side
 ROUTE_POINTS = 5000
-LIFT = 0.004  # how far lines hover over the terrain, as a share of the longer side
+LIFT = 0.004  # how far lines are drawn above the terrain, as a share of the longer side
 EXAGGERATIONS = (1, 2, 5)
-RELIEF = 0.35  # the exaggeration at first is the largest that keeps to this share of the side
+RELIEF = 0.35  # heights reach at most this share of the side with the first exaggeration
 EDGE_COLOUR = "#101010"
-# Why ground is not free, and its colour: as on the maps.
+# Why ground is not free, and its colour, the same as on the maps.
 REASONS = (
     ("blocked or no data", "#3b3b3b"),
     ("too steep", "#6b1f85"),
-    ("too near, or outside", "#8f8f8f"),
+    ("too close to an obstacle, or outside", "#8f8f8f"),
 )
-# Graphics cards count in 32 bits: far from zero, coordinates are shown from a nearer origin.
+# Graphics cards compute in 32 bits: coordinates far from zero are drawn from a closer origin.
 FAR = 1000.0
 STYLE = "<style>body { margin: 0 }</style>"
 CAMERA = {"eye": {"x": -0.55, "y": -1.3, "z": 0.85}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
-# Where a marker is, for the pointer.
+# The text that shows where a marker is.
 AT = "%{customdata[0]:.10g}, %{customdata[1]:.10g}"
 
 
 class Stage(NamedTuple):
-    """What all parts of the scene share."""
+    """What all parts of the 3-D scene share."""
 
     solution: Solution
     terrain: Terrain
     origin: Array  # (2,), map units: what drawn coordinates are counted from
-    scale: float  # units of height a unit of the plane
+    scale: float  # units of height in one unit of the plane
     lift: float  # units of height
 
     @classmethod
@@ -65,7 +66,7 @@ class Stage(NamedTuple):
         return cls(solution, terrain, origin, scale, LIFT * side * scale)
 
     def drawn(self, points: Array, lifts: float = 1.0) -> dict[str, Array]:
-        """x, y, z of lines over the terrain: never under its mesh, which is coarser."""
+        """x, y, z of lines above the terrain, and never below its mesh, which is coarser."""
         mesh = self.terrain.drawn_heights(*points.T)
         heights = self.solution.problem.surface.values(points)[:, 0]
         x, y = (points - self.origin).T
@@ -73,7 +74,7 @@ class Stage(NamedTuple):
 
 
 def _shown(text: str) -> str:
-    """A name from a file, without markup and without characters that cannot be written."""
+    """A name from a file, without markup and without characters that cannot be printed."""
     return escape(clean(text))
 
 
@@ -122,7 +123,7 @@ def _terrain_traces(stage: Stage) -> list[Any]:
 
 
 def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
-    """Ground that is not free, drawn a little higher; the legend shows the reasons."""
+    """Ground that is not free, drawn slightly higher; the legend shows the reasons."""
     import plotly.graph_objects as go
 
     terrain = stage.terrain
@@ -158,7 +159,7 @@ def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
 
 
 def _outlines(stage: Stage) -> list[Any]:
-    """Edges of polygons, walls and discs as given, drawn over the terrain as one broken line."""
+    """Edges of polygons, walls and discs as given, drawn on the terrain as one line with gaps."""
     import plotly.graph_objects as go
 
     problem = stage.solution.problem
@@ -179,14 +180,14 @@ def _outlines(stage: Stage) -> list[Any]:
     return [go.Scatter3d(**broken, mode="lines", line=style, name="outlines", hoverinfo="skip")]
 
 
-def _thinned(route: Route) -> Any:
+def _drawn_indices(route: Route) -> npt.NDArray[np.intp]:
     """Indices of the profile's points that are drawn."""
     count = len(route.profile.points)
-    return np.unique(np.linspace(0, count - 1, min(count, ROUTE_POINTS)).round().astype(int))
+    return np.unique(np.linspace(0, count - 1, min(count, ROUTE_POINTS)).round().astype(np.intp))
 
 
 def _route_traces(stage: Stage) -> list[Any]:
-    """The route, with what the pointer shows of it, and the next best routes."""
+    """The route, with the text that the pointer shows on it, and the next best routes."""
     import plotly.graph_objects as go
 
     solution = stage.solution
@@ -195,7 +196,7 @@ def _route_traces(stage: Stage) -> list[Any]:
     surface, profile, kept = (
         solution.problem.surface,
         solution.path.profile,
-        _thinned(solution.path),
+        _drawn_indices(solution.path),
     )
     height, unit = surface.layers[0], surface.unit
     # Distance, height, slope along, slope of the ground, place.
@@ -211,7 +212,7 @@ def _route_traces(stage: Stage) -> list[Any]:
     for route, colour in zip(solution.alternatives, ALTERNATIVE_COLOURS, strict=False):
         name = f"next best, {format_length(route.length, escape(unit))}"
         line = {"color": colour, "width": 4, "dash": "dash"}
-        points = route.profile.points[_thinned(route)]
+        points = route.profile.points[_drawn_indices(route)]
         traces.append(
             go.Scatter3d(
                 **stage.drawn(points), mode="lines", line=line, name=name, hoverinfo="name"
@@ -274,11 +275,11 @@ def _axis_title(name: str, unit: str, origin: float) -> dict[str, str]:
 
 
 def _layout(stage: Stage) -> dict[str, Any]:
-    """Axes true to scale, and buttons that exaggerate the heights."""
+    """Axes at the same scale, and buttons that exaggerate the heights."""
     solution, bounds = stage.solution, stage.solution.problem.bounds
     surface, heights = solution.problem.surface, stage.terrain.values[0]
     side = max(bounds.width, bounds.height)
-    # The floor is a little lower than the ground, or its lines would shine through.
+    # The bottom of the box is a little below the ground, or its lines would show through.
     low, high = float(heights.min()) - stage.lift, float(heights.max()) + 3.0 * stage.lift
     true = (high - low) / stage.scale / side
     flat = {"x": bounds.width / side, "y": bounds.height / side}
@@ -318,7 +319,7 @@ def _layout(stage: Stage) -> dict[str, Any]:
         ],
         "annotations": [
             {
-                "text": "heights drawn",
+                "text": "height exaggeration",
                 "showarrow": False,
                 "xref": "paper",
                 "yref": "paper",
@@ -334,7 +335,7 @@ def _layout(stage: Stage) -> dict[str, Any]:
 
 
 def draw_page(solution: Solution) -> Any:
-    """A plotly figure of terrain, obstacles, route and ends."""
+    """A plotly figure of terrain, obstacles, route, start and goal."""
     require_packages("a page", "plotly")
     import plotly.graph_objects as go
 
@@ -344,7 +345,7 @@ def draw_page(solution: Solution) -> Any:
 
 
 def require_known_page(path: Path) -> None:
-    """Raise MapError for an ending that is no page's, MissingExtraError without plotly."""
+    """Raise MapError for a file ending other than .html, MissingExtraError without plotly."""
     if path.suffix.lower() != ENDING:
         raise MapError(f"page={str(path)!r} has no known format; end it in {ENDING}")
     require_packages(f"page={str(path)!r}", "plotly")

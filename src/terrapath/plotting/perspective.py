@@ -27,7 +27,7 @@ PATH_POINTS = 1500
 class Ground(QuadMesh):
     """Quadrilaterals of a height map in a 3-D view, painted from the farthest to the nearest.
 
-    Rows and columns of a height map, taken from the far corner on, are in that order already:
+    Rows and columns of a height map that start at the far corner have this order already. So
     nothing is sorted, and matplotlib draws the mesh in one call.
     """
 
@@ -40,12 +40,12 @@ class Ground(QuadMesh):
         super().__init__(np.moveaxis(self._corners[:2], 0, -1), **style)
 
     def do_3d_projection(self) -> float:
-        """Where the corners are in the picture, as the axes ask before they draw."""
+        """Compute where the corners are in the picture; the axes call this before they draw."""
         axes: Any = self.axes
         flat = self._corners.reshape(3, -1)
-        seen_x, seen_y, depth = proj3d.proj_transform(*flat, axes.get_proj())
+        screen_x, screen_y, depth = proj3d.proj_transform(*flat, axes.get_proj())
         shape = (*self._corners.shape[1:], 2)
-        self._coordinates: Array = np.stack([seen_x, seen_y], axis=-1).reshape(shape)
+        self._coordinates: Array = np.stack([screen_x, screen_y], axis=-1).reshape(shape)
         return float(depth.min())
 
 
@@ -65,7 +65,7 @@ def _view_direction(box: Array, spread: Array) -> Array:
 def _is_hidden(
     terrain: Terrain, lifted: Array, towards: Array, lift: float
 ) -> npt.NDArray[np.bool_]:
-    """Which points (m, 3) lie behind the surface, by walking from each towards the viewer."""
+    """Which points (m, 3) the surface hides; tested in steps from each point to the viewer."""
     reach = (terrain.values[0].max() - lifted[:, 2].min()) / towards[2]
     steps = np.linspace(0.0, reach, SIGHT_STEPS)[1:, None, None]
     sight = lifted + steps * towards
@@ -81,7 +81,7 @@ def _draw_path(axes: Any, solution: Solution, terrain: Terrain, box: Array, spre
     profile = solution.path.profile
     lift = 0.008 * float(spread[2])
     lifted = np.column_stack([profile.points, profile.values[:, 0] + lift])
-    # Finer than this no eye sees, and every point is asked whether it is hidden.
+    # More points would not be visible, and each point is tested for whether it is hidden.
     lifted = lifted[np.linspace(0, len(lifted) - 1, min(len(lifted), PATH_POINTS)).astype(int)]
     hidden = _is_hidden(terrain, lifted, _view_direction(box, spread), lift)
     shown, behind = lifted.copy(), lifted.copy()
@@ -96,7 +96,7 @@ def _draw_path(axes: Any, solution: Solution, terrain: Terrain, box: Array, spre
 
 
 def draw_perspective(axes: Any, solution: Solution) -> None:
-    """Draw the surface onto 3-D axes, coloured by the second layer where there is one."""
+    """Draw the surface on 3-D axes, coloured by the second layer where there is one."""
     problem = solution.problem
     terrain = Terrain.sample(problem, SAMPLES)
     layer = 1 if len(terrain.values) > 1 else 0
@@ -119,7 +119,7 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     axes.view_init(elev=ELEVATION, azim=AZIMUTH)
     _draw_path(axes, solution, terrain, box, np.array([bounds.width, bounds.height, high - low]))
     label_axes(axes, problem)
-    # Above the corner where its axis stands: beside it lie its numbers and the picture's edge.
+    # The label is above the corner of its axis: beside it are the numbers and the picture's edge.
     above = high + 0.25 * (high - low)
     axes.text(bounds.x1_min, bounds.x2_max, above, terrain.label(0), ha="center", va="bottom")
     axes.zaxis.set_major_locator(_few_ticks())
@@ -130,12 +130,16 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     exaggeration = RELIEF * longer / (high - low)
     if problem.surface.unit == problem.surface.layers[0].unit and exaggeration > 1.05:
         axes.text2D(
-            0.02, 0.95, f"heights drawn {exaggeration:.1f} times", transform=axes.transAxes, size=8
+            0.02,
+            0.95,
+            f"heights exaggerated {exaggeration:.1f} times",
+            transform=axes.transAxes,
+            size=8,
         )
 
 
 def _tint(colours: Array, cells: npt.NDArray[np.bool_], tone: tuple[float, ...]) -> None:
-    """Put a translucent tone over some of the ground."""
+    """Put a translucent colour over some cells of the ground."""
     *tint, opacity = tone
     colours[cells] = (1.0 - opacity) * colours[cells] + opacity * np.array(tint)
 

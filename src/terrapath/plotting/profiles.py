@@ -11,7 +11,7 @@ COLOURS = ("#6e6e6e", "#e4002b", "#0b3dff", "#2e8b3d")
 
 
 def draw_profiles(axes: Any, paths: Mapping[str, Path], layer: int) -> None:
-    """One layer's values against the travelled share of each path's length."""
+    """Draw the values of one layer along each path, against the share of its length."""
     for (label, path), colour in zip(paths.items(), COLOURS, strict=False):
         profile = path.profile
         share = profile.distance / profile.distance[-1]

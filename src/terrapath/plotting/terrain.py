@@ -12,9 +12,10 @@ import numpy.typing as npt
 import shapely
 from matplotlib import colormaps
 from matplotlib.colors import LightSource, Normalize
+from shapely.geometry.base import BaseGeometry
 
 from ..problem import Problem
-from ..space.free_space import Circle, sort_obstacles
+from ..space.free_space import Circle, Geometries, sort_obstacles
 from ..surface import Mask
 from ..surface.neighbours import bilinear
 from ..validation import Array
@@ -24,8 +25,8 @@ Cells: TypeAlias = npt.NDArray[np.bool_]
 
 HEIGHT_COLOURS = "gist_earth"
 LAYER_COLOURS = "plasma"
-# Relief that looks like relief: the surface is shaded as if its range were this share of
-# its extent.
+# The surface is shaded as if its range of heights were this share of its extent, so that the
+# relief is visible on flat and on steep ground.
 SHADED_RELIEF = 0.12
 
 
@@ -64,7 +65,7 @@ class Terrain:
 
     @cached_property
     def solid(self) -> Cells:
-        """(ny, nx): samples in an obstacle as it was given, or without data."""
+        """(ny, nx): samples inside a given obstacle (without its margin), or without data."""
         constraints = self.problem.constraints
         parts = sort_obstacles(constraints.obstacles)
         nodata = [] if constraints.nodata is None else [constraints.nodata]
@@ -72,7 +73,7 @@ class Terrain:
 
     @cached_property
     def masked(self) -> Cells:
-        """(ny, nx): samples in a blocked cell of a mask that was given, or without data."""
+        """(ny, nx): samples in a blocked cell of a given mask, or without data."""
         constraints = self.problem.constraints
         given = [*constraints.obstacles, constraints.nodata]
         return self._inside([], [], [mask for mask in given if isinstance(mask, Mask)])
@@ -85,36 +86,39 @@ class Terrain:
 
     @cached_property
     def in_mask_margin(self) -> Cells:
-        """(ny, nx): samples that are nearer than the radius to a blocked cell, but not in one."""
+        """(ny, nx): samples closer than the radius to a blocked cell, but not in one."""
         inflated = self._inside([], [], self.problem.free_space.masks)
         return inflated & ~self.masked & ~self.steep
 
     def _inside(
-        self, geometries: Sequence[Any] | Any, circles: Sequence[Circle], masks: Sequence[Mask]
+        self,
+        geometries: Sequence[BaseGeometry] | Geometries,
+        circles: Sequence[Circle],
+        masks: Sequence[Mask],
     ) -> Cells:
         """(ny, nx): samples in any of the obstacles."""
-        found = np.zeros((len(self.y), len(self.x)), bool)
+        inside = np.zeros((len(self.y), len(self.x)), bool)
         for mask in masks:
-            found |= self._in_mask(mask)
+            inside |= self._in_mask(mask)
         x, y = np.meshgrid(self.x, self.y)
         for circle in circles:
-            found |= np.hypot(x - circle.x1, y - circle.x2) <= circle.radius
+            inside |= np.hypot(x - circle.x1, y - circle.x2) <= circle.radius
         if len(geometries):
             samples = shapely.points(x.ravel(), y.ravel())
             held, _ = shapely.STRtree(geometries).query(samples, predicate="within")
-            found.ravel()[held] = True
-        return found
+            inside.ravel()[held] = True
+        return inside
 
     def _in_mask(self, mask: Mask) -> Cells:
-        found = np.zeros((len(self.y), len(self.x)), bool)
+        inside = np.zeros((len(self.y), len(self.x)), bool)
         dx, dy = mask.spacing
         i = np.floor((self.x - mask.x[0]) / dx + 0.5).astype(int)
         j = np.floor((self.y - mask.y[0]) / dy + 0.5).astype(int)
         rows, columns = mask.blocked.shape
-        ok = np.ix_((j >= 0) & (j < rows), (i >= 0) & (i < columns))
+        on_grid = np.ix_((j >= 0) & (j < rows), (i >= 0) & (i < columns))
         cells = mask.blocked[np.clip(j, 0, rows - 1)][:, np.clip(i, 0, columns - 1)]
-        found[ok] = cells[ok]
-        return found
+        inside[on_grid] = cells[on_grid]
+        return inside
 
     def label(self, layer: int) -> str:
         """Name and unit of a layer."""
@@ -122,18 +126,18 @@ class Terrain:
         return with_unit(shown.name, shown.unit)
 
     def norm(self, layer: int) -> Normalize:
-        """Colour scale over the part of a layer that is not blocked."""
+        """The colour scale of a layer, from the part of it that is not blocked."""
         shown = ~self.masked
         values = self.values[layer][shown if shown.any() else ~shown]
         low, high = float(values.min()), float(values.max())
         return Normalize(low, high if high > low else low + 1.0)
 
     def shaded(self, layer: int) -> Array:
-        """(ny, nx, 3): a layer's colours under the light that falls on the first layer."""
+        """(ny, nx, 3): a layer's colours, with the hill shade of the first layer."""
         name = HEIGHT_COLOURS if layer == 0 else LAYER_COLOURS
         norm = self.norm(layer)
         fraction = norm(self.values[layer])
-        if layer == 0:  # leave out the sea and the snow of the colour map
+        if layer == 0:  # leave out the blue and the white end of the colour map
             fraction = 0.22 + 0.68 * np.asarray(fraction)
         colours = colormaps[name](fraction)[..., :3]
         height = self.values[0]

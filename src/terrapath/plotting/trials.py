@@ -1,4 +1,4 @@
-"""Lengths of many runs: box plots, and lines against the number of samples."""
+"""Charts of many runs: box plots, and lengths against the number of samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BOX_COLOUR = "#9ecae1"
 
 
 def draw_box(axes: Any, lengths: Sequence[float], true_length: float, title: str) -> None:
-    """A box plot of path lengths (map units), with all runs beside it."""
+    """Draw a box plot of path lengths (map units), with a point for each run beside it."""
     values = np.asarray(lengths)
     axes.boxplot(
         values,
@@ -25,7 +25,7 @@ def draw_box(axes: Any, lengths: Sequence[float], true_length: float, title: str
         medianprops={"color": "black", "lw": 1.6},
         flierprops={"marker": "x", "ms": 5},
     )
-    # Spread by rank, not at random: the picture is the same every time.
+    # Spread by their index, not at random, so that the picture is the same every time.
     spread = 0.36 + 0.22 * (np.arange(len(values)) * 0.618034 % 1.0)
     axes.plot(spread, values, "o", ms=3, color="#08519c", alpha=0.5, mew=0.0)
     axes.axhline(true_length, color=TRUE_COLOUR, lw=1.6, label=f"true: {true_length:.5f}")
@@ -37,7 +37,7 @@ def draw_box(axes: Any, lengths: Sequence[float], true_length: float, title: str
 
 
 def draw_orders(axes: Any, scales: Sequence[float], errors: Array, name: str) -> None:
-    """Relative errors against a length scale, on logarithmic axes; scales, errors: (k,)."""
+    """Draw relative errors against a length scale, on logarithmic axes; scales, errors: (k,)."""
     axes.loglog(scales, np.abs(errors), "o-", lw=1.6, ms=5, label=name)
     axes.set(
         xlabel="scale of the smoothing (map units)",
@@ -48,7 +48,7 @@ def draw_orders(axes: Any, scales: Sequence[float], errors: Array, name: str) ->
 
 
 def draw_convergence(axes: Any, samples: Sequence[int], lengths: Array, true_length: float) -> None:
-    """Mean length against samples, with one standard deviation and the extremes.
+    """Draw the mean length against samples, with one standard deviation and the extremes.
 
     samples : (k,). lengths : (k, runs), map units.
     """

@@ -1,4 +1,4 @@
-"""Surfaces, their metric, and how they are made of maps and functions."""
+"""Surfaces, their metric, and how they are made from maps and functions."""
 
 import lazy_loader
 

@@ -1,10 +1,11 @@
-"""What of the plane there is to plan on: bounds around it, and masks of cells that are not."""
+"""The part of the plane to plan on: its bounds, and masks of blocked cells."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,11 +34,11 @@ class Bounds(NamedTuple):
 
     @property
     def side(self) -> float:
-        """Side of the square that is as large, map units."""
+        """Side of the square of the same area, map units."""
         return math.sqrt(self.width * self.height)
 
     def widened(self, margin: float) -> Bounds:
-        """With so much more on every side, map units."""
+        """The rectangle with a margin added on every side, map units."""
         low, high = (self.x1_min - margin, self.x2_min - margin), (self.x1_max, self.x2_max)
         return Bounds(*low, *(edge + margin for edge in high))
 
@@ -58,8 +59,8 @@ class Bounds(NamedTuple):
         )
 
 
-def as_bounds(bounds: Any, name: str = "bounds") -> Bounds:
-    """(x1_min, x2_min, x1_max, x2_max), finite and not empty."""
+def as_bounds(bounds: Sequence[float] | Array, name: str = "bounds") -> Bounds:
+    """The rectangle (x1_min, x2_min, x1_max, x2_max), checked to be finite and not empty."""
     try:
         result = Bounds(*(float(value) for value in bounds))
     except (TypeError, ValueError):
@@ -77,7 +78,7 @@ def as_bounds(bounds: Any, name: str = "bounds") -> Bounds:
 
 
 def uniform_spacing(axis: Array) -> float | None:
-    """The spacing of a uniform axis, None for another one."""
+    """The spacing of a uniform axis; None for an axis that is not uniform."""
     spacing = float((axis[-1] - axis[0]) / (len(axis) - 1))
     return spacing if np.allclose(np.diff(axis), spacing, rtol=1e-6, atol=0.0) else None
 
@@ -94,7 +95,7 @@ class Mask:
     x: Array
     y: Array
 
-    def __init__(self, blocked: Any, x: Any, y: Any) -> None:
+    def __init__(self, blocked: npt.ArrayLike, x: npt.ArrayLike, y: npt.ArrayLike) -> None:
         cells = np.ascontiguousarray(blocked)
         if cells.dtype != np.bool_ or cells.ndim != 2 or min(cells.shape) < 2:
             raise InputError(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import sympy
 from sympy.core.function import AppliedUndef
 from sympy.parsing.sympy_parser import parse_expr
@@ -20,7 +20,7 @@ X1, X2 = sympy.symbols("x1 x2", real=True)
 def _parse(text: str) -> sympy.Expr:
     try:
         expression = parse_expr(str(text), local_dict={"x1": X1, "x2": X2})
-    except Exception as error:  # SymPy's parser raises whatever Python's does
+    except Exception as error:  # SymPy's parser raises any error that Python's does
         raise InputError(f"expression {text!r} is not understood: {error}") from None
     if not isinstance(expression, sympy.Expr):
         raise InputError(f"expression {text!r} is not a formula; write it in x1 and x2")
@@ -38,11 +38,13 @@ def _parse(text: str) -> sympy.Expr:
 
 
 def _array_function(expressions: Sequence[sympy.Expr]) -> Callable[[Array, Array], Array]:
-    functions: list[Any] = [sympy.lambdify((X1, X2), e, "numpy") for e in expressions]
+    functions: list[Callable[[Array, Array], npt.ArrayLike]] = [
+        sympy.lambdify((X1, X2), e, "numpy") for e in expressions
+    ]
 
     def evaluate(x: Array, y: Array) -> Array:
-        # A constant expression gives a scalar whatever the arrays. What is not finite is
-        # found, and its place named, by the fit.
+        # A constant expression gives a scalar even for arrays. The fit looks for values that
+        # are not finite, and names their place.
         with np.errstate(all="ignore"):
             return np.stack([np.broadcast_to(f(x, y), x.shape) for f in functions])
 

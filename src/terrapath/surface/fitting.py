@@ -1,4 +1,4 @@
-"""B-splines through grids and functions, with the error of the fit measured."""
+"""Fits B-splines to grids and functions, and measures the error of the fit."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from .._kernels.surface.surfaces import Spline, fill_jets, fill_values
 from .._kernels.surface.tridiagonal import solve_curvatures
@@ -19,20 +20,21 @@ from .bounds import Bounds, uniform_spacing
 if TYPE_CHECKING:
     from .smoothing import Smoothing
 
-Function = Callable[[Array, Array], Array]
+# From (x, y), arrays of one shape, to (layers, ...).
+Function = Callable[[Array, Array], npt.ArrayLike]
 
 # From (x, y), arrays of one shape, to (2, layers, ...): d/dx1 and d/dx2.
 Gradient = Callable[[Array, Array], Array]
 
-FIRST_SAMPLES = 33  # a side, the coarsest grid that a function is tried on
-MOST_SAMPLES = 4097  # a side, the finest
+FIRST_SAMPLES = 33  # on a side of the coarsest grid that is tried
+MOST_SAMPLES = 4097  # on a side of the finest grid
 TEST_POINTS = 8192
-DIFFERENCES_PER_CELL = 64.0  # the step of the differences that gradients are checked with
-SAFETY = 0.5  # a fit is taken at this share of the tolerance: no test point is the worst one
-COARSE_TOLERANCE = 1e-3  # share of a layer's range that counts as "the shape is seen"
+DIFFERENCES_PER_CELL = 64.0  # finite differences that check gradients have this many steps a cell
+SAFETY = 0.5  # errors must be this share of the tolerance: no test point finds the largest error
+COARSE_TOLERANCE = 1e-3  # a grid shows a layer's shape to this share of the layer's range
 MOST_RESAMPLING = 8  # how many times finer a non-uniform axis may become
-SAMPLES_PER_SCALE = 8.0  # of a function that is smoothed
-LEAST_SMOOTHED_SAMPLES = 257  # a side, however large the scale: the function may be finer
+SAMPLES_PER_SCALE = 8.0  # samples of a smoothed function in one length scale
+LEAST_SMOOTHED_SAMPLES = 257  # on a side, for any scale: the function may have finer features
 
 
 class GridFit(NamedTuple):
@@ -44,13 +46,13 @@ class GridFit(NamedTuple):
 
 
 class FunctionFit(NamedTuple):
-    """A spline that follows a function, or a function smoothed."""
+    """A spline that approximates a function, or a smoothed function."""
 
     spline: Spline
     samples: tuple[int, int]  # along x1 and x2
-    value_error: float  # largest found at points it was not fitted on
+    value_error: float  # the largest found at points that it was not fitted to
     gradient_error: float | None  # None where it was not measured
-    resolution: float  # map units: spacing that shows the function's shape
+    resolution: float  # map units: the spacing that shows the function's shape
     smoothing: Smoothing | None = None
 
 
@@ -67,7 +69,7 @@ def _curvatures(f: Array) -> Array:
     """Second derivatives h^2 f'' (n, m) of the interpolating splines through columns f (n, m).
 
     At inner knots m_(j-1) + 4 m_j + m_(j+1) = 6 (f_(j-1) - 2 f_j + f_(j+1)). With not-a-knot
-    ends m_0 = 2 m_1 - m_2, which makes m_1 the second difference itself, and so at the end.
+    ends m_0 = 2 m_1 - m_2, which makes m_1 the second difference itself; likewise at the other end.
     """
     m = np.empty(f.shape, order="F")
     inner = m[1:-1]
@@ -97,7 +99,7 @@ def _to_coefficients(lines: Array) -> None:
 
 
 def _padded(values: Array) -> Array:
-    """Values (layers, ny, nx) with room for the outermost coefficients."""
+    """Values (layers, ny, nx) with space around them for the outermost coefficients."""
     layers, ny, nx = values.shape
     padded = np.empty((layers, ny + 2, nx + 2))
     padded[:, 1:-1, 1:-1] = values
@@ -108,7 +110,7 @@ def _spline_of(padded: Array, x: Array, y: Array, weights: Array) -> Spline:
     """The bicubic spline through the values in ``padded``, which become its coefficients."""
     for layer in padded:
         for rows in blocks(layer.shape[0], layer.shape[1]):
-            # The room above and below holds nothing yet.
+            # The space above and below holds no values yet.
             kept = slice(max(rows.start, 1), min(rows.stop, layer.shape[0] - 1))
             if kept.start < kept.stop:
                 _to_coefficients(layer[kept].T)
@@ -125,9 +127,9 @@ def interpolate(values: Array, x: Array, y: Array, weights: Array) -> Spline:
 
 
 def _resample(values: Array, x: Array, axis: int, linear: bool) -> tuple[Array, Array]:
-    """Bring a non-uniform axis onto a uniform one as fine as its finest step.
+    """Resample a non-uniform axis to a uniform one, with its finest step.
 
-    Smoothly, or linearly, which stays between the samples.
+    By a cubic spline, or linearly; linear values stay within the range of the samples.
     """
     if uniform_spacing(x) is not None:
         return values, x
@@ -147,9 +149,9 @@ def _resample(values: Array, x: Array, axis: int, linear: bool) -> tuple[Array, 
 def _at_samples(spline: Spline, x: Array, y: Array) -> Array:
     """The spline's values (layers, ny, nx) on a grid."""
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    found = np.empty((len(points), len(spline.weights)))
-    fill_values(spline, points, found)
-    return found.T.reshape(-1, len(y), len(x))
+    values = np.empty((len(points), len(spline.weights)))
+    fill_values(spline, points, values)
+    return values.T.reshape(-1, len(y), len(x))
 
 
 def _largest_error(spline: Spline, x: Array, y: Array, values: Array) -> float:
@@ -161,7 +163,7 @@ def _largest_error(spline: Spline, x: Array, y: Array, values: Array) -> float:
 
 
 def _change(scale: float, before: Spline, after: Spline, x: Array, y: Array) -> Smoothing:
-    """What smoothing changed at the samples."""
+    """How much smoothing changed the values at the samples."""
     from .smoothing import ChangeMeter
 
     change = ChangeMeter(len(before.weights))
@@ -175,10 +177,10 @@ def fit_grid(
 ) -> GridFit:
     """The spline through values (layers, ny, nx), smoothed where the scale is above 0.
 
-    linear : where steps are not equal, its knots lie between the samples around; those of a
-    smooth curve through samples with a sharp edge would swing beyond them.
-    Large maps must fit: beside the values it holds one array of their size, two where it
-    smooths.
+    linear : resample unequal steps linearly, so that values at knots stay between the samples
+    around them; a smooth curve would overshoot at a sharp edge.
+    Large maps must fit into memory. Besides the values this needs one array of their size, or two
+    where it smooths.
     """
     resampled, fine_x = _resample(values, x, 2, linear)
     resampled, fine_y = _resample(resampled, y, 1, linear)
@@ -206,7 +208,7 @@ def _require_finite(name: str, values: Array, x: Array, y: Array) -> None:
 
 
 def _checked(f: Function, x: Array, y: Array) -> Array:
-    """f(x, y) as (layers, ...), finite, or an error that names the place."""
+    """f(x, y) as (layers, ...); raises InputError with the place where it is not finite."""
     values = np.asarray(f(x, y), dtype=np.float64)
     if values.shape == x.shape:
         values = values[None]
@@ -238,7 +240,7 @@ def _difference_gradient(f: Function, step: float) -> Gradient:
 
 
 def _exact_gradient(gradient: Gradient, layers: int) -> Gradient:
-    """A user's gradient, its answer checked: (2, layers, ...), finite."""
+    """A user's gradient, with its result checked: (2, layers, ...), finite."""
 
     def checked(x: Array, y: Array) -> Array:
         slopes = np.asarray(gradient(x, y), dtype=np.float64)
@@ -256,11 +258,11 @@ def _exact_gradient(gradient: Gradient, layers: int) -> Gradient:
 
 
 def _test_points(bounds: Bounds, margin: float) -> tuple[Array, Array]:
-    """Points off every grid (Sobol, scrambled, seed 0) inside a margin, some on its edges."""
+    """Points that lie on no grid (Sobol, scrambled, seed 0) inside a margin, some on its edges."""
     from scipy.stats import qmc
 
     u, v = qmc.Sobol(2, seed=0).random(TEST_POINTS).T
-    edge = TEST_POINTS // 32  # points on each edge, where splines are at their worst
+    edge = TEST_POINTS // 32  # points on each edge, where splines are least accurate
     u[:edge], u[edge : 2 * edge] = 0.0, 1.0
     v[2 * edge : 3 * edge], v[3 * edge : 4 * edge] = 0.0, 1.0
     x = bounds.x1_min + margin + u * (bounds.width - 2.0 * margin)
@@ -271,7 +273,7 @@ def _test_points(bounds: Bounds, margin: float) -> tuple[Array, Array]:
 def _errors(
     f: Function, gradient: Gradient | None, spline: Spline, bounds: Bounds
 ) -> tuple[Array, float]:
-    """Largest errors at the test points: of each layer's value, and of any gradient."""
+    """Largest errors at the test points: of the value of each layer, and of all gradients."""
     layers = len(spline.weights)
     step = min(spline.dx, spline.dy) / DIFFERENCES_PER_CELL
     if gradient is None:
@@ -288,7 +290,7 @@ def _errors(
 def fit_function(
     f: Function, bounds: Bounds, tolerance: float, gradient: Gradient | None
 ) -> FunctionFit:
-    """Refine a grid until the spline's value and gradient follow f to the tolerance."""
+    """Refine a grid until the spline has the values and gradients of f within the tolerance."""
     resolution: float | None = None
     samples = FIRST_SAMPLES
     while True:
@@ -299,9 +301,9 @@ def fit_function(
         value_errors, gradient_error = _errors(f, gradient, spline, bounds)
         worst, spacing = float(value_errors.max()), max(spline.dx, spline.dy)
         spread = values.max(axis=(1, 2)) - values.min(axis=(1, 2))
-        # Of a layer that is constant, rounding apart, there is no shape to see.
-        seen = np.maximum(COARSE_TOLERANCE * spread, SAFETY * tolerance)
-        if resolution is None and (value_errors <= seen).all():
+        # A layer that is constant except for rounding has no shape.
+        coarse = np.maximum(COARSE_TOLERANCE * spread, SAFETY * tolerance)
+        if resolution is None and (value_errors <= coarse).all():
             resolution = spacing
         if max(worst, gradient_error) <= SAFETY * tolerance:
             shape = (samples, samples)
@@ -317,7 +319,7 @@ def fit_function(
 
 
 def _axis_for(scale: float, start: float, end: float) -> Array:
-    """Samples along one side, fine against the scale; an even number of steps."""
+    """Samples along one side, fine compared with the scale; the number of steps is even."""
     steps = 2 * math.ceil(0.5 * SAMPLES_PER_SCALE * (end - start) / scale)
     if steps + 1 > MOST_SAMPLES:
         least = SAMPLES_PER_SCALE * (end - start) / (MOST_SAMPLES - 1)
@@ -329,10 +331,10 @@ def _axis_for(scale: float, start: float, end: float) -> Array:
 
 
 def fit_smoothed(f: Function, bounds: Bounds, scale: float) -> FunctionFit:
-    """The spline through f smoothed; f is asked at points within the bounds only.
+    """The spline through the smoothed f; f is evaluated only within the bounds.
 
-    The error is what smoothing every other sample only would have changed; the spline
-    through all samples is nearer to the truth than that.
+    The error is the difference from smoothing only every second sample. The spline through all
+    samples is more accurate than that.
     """
     from .smoothing import FEATURES_PER_SCALE, Smoothing, smooth
 

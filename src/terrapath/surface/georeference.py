@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from .bounds import Bounds
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer
 
-# Of lengths, as CRSs and maps write them: metres each.
+# Units of length, as CRSs and maps write them, and their size in metres.
 LENGTH_UNITS = {
     **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
     **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1000.0),
@@ -30,19 +30,20 @@ LENGTH_UNITS = {
     **dict.fromkeys(("yd", "yard", "yards"), 0.9144),
 }
 
-# Metres that a projection's scale is measured over: far above rounding, below what bends it.
+# A projection's scale is measured over this distance, metres: far above rounding, and so short
+# that the scale hardly changes over it.
 SCALE_STEP = 100.0
 
 
 def metres_of(unit: str) -> float | None:
-    """Length of a unit in metres; None where it is none of length."""
+    """Length of a unit in metres; None where it is not a known unit of length."""
     return LENGTH_UNITS.get(unit.strip().lower())
 
 
-def parse_crs(text: Any, name: str = "the CRS") -> CRS | None:
-    """A CRS of the plane from whatever names one; None where there is none.
+def parse_crs(text: object, name: str = "the CRS") -> CRS | None:
+    """A horizontal CRS from anything that names one; None where there is none.
 
-    Of a compound CRS the horizontal part, of a bound one its source. Raises MapError.
+    For a compound CRS the horizontal part, for a bound CRS its source. Raises MapError.
     """
     from pyproj import CRS
     from pyproj.exceptions import CRSError, ProjError
@@ -60,10 +61,10 @@ def parse_crs(text: Any, name: str = "the CRS") -> CRS | None:
         crs = part
     if crs.is_geocentric or crs.is_vertical:
         raise MapError(
-            f"{name} ({crs.name}) is not one of the plane; give a projected or a geographic CRS"
+            f"{name} ({crs.name}) is not horizontal; give a projected or a geographic CRS"
         )
     if crs.geodetic_crs is None:
-        return None  # an engineering CRS: a plane that lies nowhere known
+        return None  # an engineering CRS: its place on Earth is not known
     if crs.is_geographic and len(crs.axis_info) > 2:
         crs = crs.to_2d()
     if crs.is_geographic and any(axis.unit_name != "degree" for axis in crs.axis_info):
@@ -76,7 +77,7 @@ def parse_crs(text: Any, name: str = "the CRS") -> CRS | None:
 
 @cache
 def transformer(source: CRS, target: CRS) -> Transformer:
-    """From one CRS to another, x (longitude) first. Raises MapError where there is no way."""
+    """From one CRS to another, x (longitude) first. Raises MapError where this cannot be done."""
     from pyproj import Transformer
     from pyproj.exceptions import ProjError
 
@@ -85,22 +86,22 @@ def transformer(source: CRS, target: CRS) -> Transformer:
     except ProjError as error:
         reason = " ".join(str(error).split())
         raise MapError(
-            f"there is no way from the CRS {source.name} to {target.name}: {reason:.120}; "
+            f"the CRS {source.name} cannot be transformed to {target.name}: {reason:.120}; "
             "check that both are of the same body"
         ) from None
 
 
 def worst_scale(crs: CRS, x: Array, y: Array) -> float:
-    """How far, at worst, lengths on a projection are off at points: 0.01 for 1 %.
+    """The largest relative error of lengths on a projection at points: 0.01 for 1 %.
 
-    Tissot's ellipse by differences. ``pyproj.Proj`` has it too, but sets the process's filters of
-    warnings and puts them back, which other threads see. Infinite where the projection does not
-    reach the points.
+    From Tissot's ellipse by finite differences. ``pyproj.Proj`` computes it too, but changes the
+    warning filters of the whole process meanwhile, and so of other threads. Infinite where the
+    projection is not defined at the points.
     """
     step = SCALE_STEP / crs.axis_info[0].unit_conversion_factor
     along_x = _on_body(crs, x + step, y) - _on_body(crs, x - step, y)
     along_y = _on_body(crs, x, y + step) - _on_body(crs, x, y - step)
-    # Metres on the ground in one of the plane, (points, 3, 2).
+    # Metres on the ground for each metre on the plane, (points, 3, 2).
     ground = np.stack([along_x, along_y], axis=-1).swapaxes(0, 1) / (2.0 * SCALE_STEP)
     if not np.isfinite(ground).all():
         return np.inf
@@ -116,7 +117,7 @@ def _on_body(crs: CRS, x: Array, y: Array) -> Array:
     assert body is not None
     radians = geodetic.axis_info[0].unit_conversion_factor
     longitude, latitude = radians * np.asarray(transformer(crs, geodetic).transform(x, y))
-    # Some projections give latitudes beyond the poles for places that they do not reach.
+    # Some projections give latitudes beyond the poles where they are not defined.
     reached = np.isfinite(longitude) & (np.abs(latitude) < 0.5 * np.pi + 1e-9)
     longitude, latitude = np.where(reached, [longitude, latitude], np.nan)
     a, b = body.semi_major_metre, body.semi_minor_metre
@@ -129,8 +130,8 @@ def _on_body(crs: CRS, x: Array, y: Array) -> Array:
 def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
     """Transverse Mercator in metres, true to scale at the given point of a geographic CRS.
 
-    Conformal, so directions and slopes are right, and unlike UTM without a scale factor:
-    30 km from the centre lengths are off by 1e-5. The datum stays the map's own.
+    It is conformal, so angles are right. Unlike UTM it has no scale factor: 30 km from the centre
+    lengths are wrong by 1e-5. The datum stays the map's own.
     """
     from pyproj.crs import ProjectedCRS
     from pyproj.crs.coordinate_operation import TransverseMercatorConversion
@@ -141,14 +142,14 @@ def local_projection(map_crs: CRS, longitude: float, latitude: float) -> CRS:
 
 @dataclass(frozen=True)
 class Georeference:
-    """The CRS that is planned in, and the CRS that the map came in."""
+    """Two CRSs: that of the planning plane, and the map's own."""
 
     crs: CRS
     map_crs: CRS
 
     @classmethod
-    def from_projected(cls, crs: Any) -> Georeference:
-        """A map that is planned in its own, projected CRS."""
+    def from_projected(cls, crs: CRS | str | int) -> Georeference:
+        """For a map with a projected CRS, which the planning plane shares."""
         from pyproj import CRS
         from pyproj.exceptions import CRSError
 
@@ -160,7 +161,7 @@ class Georeference:
 
     @property
     def is_map_crs(self) -> bool:
-        """Is the map planned in the CRS that it came in?"""
+        """Is the CRS of the planning plane the map's own?"""
         return bool(self.crs == self.map_crs)
 
     @property
@@ -173,13 +174,13 @@ class Georeference:
 
     @property
     def is_earth(self) -> bool:
-        """Is the body Earth? Its radius tells."""
+        """Is the body Earth? Decided by its radius."""
         radius = self.crs.ellipsoid.semi_major_metre if self.crs.ellipsoid else 0.0
         return bool(6.3e6 < radius < 6.4e6)
 
     @property
     def name(self) -> str:
-        """What the plane is, for people."""
+        """The name of the plane, for people."""
         if self.is_map_crs:
             operation = self.crs.coordinate_operation
             if self.crs.name in {"unknown", "unnamed"} and operation is not None:
@@ -189,9 +190,9 @@ class Georeference:
 
     @cached_property
     def text(self) -> str:
-        """The plane's CRS, for programs: its code where it has one, else as it was made.
+        """The plane's CRS, for programs: its code where it has one, else its definition.
 
-        A local projection has none, and to look for it takes longer than to plan a route.
+        A local projection has no code, and searching for one takes longer than planning a route.
         """
         return str(self.crs.to_string() if self.is_map_crs else self.crs.srs)
 
@@ -218,11 +219,11 @@ class Georeference:
         )
 
     def rectangle_from_map(self, bounds: Bounds) -> Bounds:
-        """The upright rectangle of the plane around one of the map's own coordinates."""
+        """The smallest rectangle on the plane around a rectangle in the map's own coordinates."""
         return Bounds(*self._to_map.transform_bounds(*bounds, direction="INVERSE"))
 
     def to_lonlat(self, points: Array) -> Array:
-        """Plane (..., 2) -> longitude and latitude in degrees: WGS 84 on Earth."""
+        """Plane (..., 2) -> longitude and latitude in degrees; on Earth, of WGS 84."""
         return np.stack(self._to_lonlat.transform(points[..., 0], points[..., 1]), axis=-1)
 
     def from_lonlat(self, lonlat: Array) -> Array:

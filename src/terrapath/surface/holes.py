@@ -1,4 +1,7 @@
-"""Cells without data: small ones filled, large ones continued so that a spline does not ring."""
+"""Holes, that is cells without data: small holes are filled and become free.
+
+Into large ones the ground is continued, so that a spline does not oscillate beside them.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,9 @@ from .neighbours import bilinear, grown
 
 Cells = npt.NDArray[np.bool_]
 
-RINGS = 8  # cells that the slope at a hole's edge is carried on for
-DAMPING = 0.8  # of the slope, from ring to ring: the ground levels off
-LARGEST_HOLE = 250_000  # cells of one hole that is filled: a sparse system of that size
+RINGS = 8  # the slope at a hole's edge is continued over this many cells
+DAMPING = 0.8  # factor of the slope from ring to ring, so that the ground levels off
+LARGEST_HOLE = 250_000  # cells of a hole that is filled: a sparse system with so many unknowns
 
 
 def missing_cells(values: Array) -> Cells:
@@ -31,7 +34,7 @@ def missing_cells(values: Array) -> Cells:
 
 
 def _carry_on(values: Array, known: Cells, damping: float) -> Cells:
-    """Give the cells next to known ones a value that carries on the slope; they are returned.
+    """Give the cells next to known ones values that continue the slope; returns these cells.
 
     From each known neighbour n with a known m behind it: f(n) + damping (f(n) - f(m)).
     On a plane, with no damping, that is exact.
@@ -67,7 +70,7 @@ def _at(
 
 
 def _coarser(values: Array, known: Cells) -> tuple[Array, Cells]:
-    """Means over the known ones of 2 x 2 cells."""
+    """Means over the known cells of each 2 x 2 block, and whether a block has any."""
     rows, columns = (-(-size // 2) for size in known.shape)
     sums, counts = np.zeros((rows, columns)), np.zeros((rows, columns))
     for dy, dx in product((0, 1), repeat=2):
@@ -78,7 +81,7 @@ def _coarser(values: Array, known: Cells) -> tuple[Array, Cells]:
 
 
 def _fill_from_coarser(values: Array, known: Cells) -> None:
-    """Fill what is unknown smoothly from means over ever larger cells (push and pull)."""
+    """Fill unknown cells smoothly from means over larger and larger blocks (push and pull)."""
     if known.all():
         return
     coarse, coarse_known = _coarser(values, known)
@@ -90,10 +93,10 @@ def _fill_from_coarser(values: Array, known: Cells) -> None:
 
 
 def continue_into_holes(values: Array, missing: Cells) -> None:
-    """Give missing cells values (ny, nx), in place, that make no cliff and no crease.
+    """Give missing cells of values (ny, nx), in place, values without steps and creases.
 
-    The slope at the edge of a hole is carried on and fades; further in lie means of what is
-    around. At least one cell must be known.
+    The slope at the edge of a hole is continued and fades. Farther inside, the values are means
+    of the ground around. At least one cell must be known.
     """
     if not missing.any():
         return
@@ -105,13 +108,13 @@ def continue_into_holes(values: Array, missing: Cells) -> None:
     _fill_from_coarser(values, known)
 
 
-# Small holes, which are filled and free
+# Small holes, which are filled and become free
 
 
 def _small_holes(missing: Cells, dx: float, dy: float, size: float) -> Cells:
     """Cells of the holes whose longer side is no more than ``size``.
 
-    Cells that touch at a corner make one hole. What reaches the map's edge is no hole.
+    Cells that touch at a corner belong to one hole. Cells that reach the map's edge are no hole.
     """
     from scipy.ndimage import find_objects, label
 
@@ -138,7 +141,7 @@ def _small_holes(missing: Cells, dx: float, dy: float, size: float) -> Cells:
 
 
 def _stencils(dx: float, dy: float) -> list[list[tuple[int, int, float]]]:
-    """The second differences whose squares a thin plate makes least: (row, column, weight)."""
+    """Second differences as (row, column, weight); a thin plate has the least sum of squares."""
     x, y, xy = 1.0 / dx**2, 1.0 / dy**2, np.sqrt(2.0) / (dx * dy)
     return [
         [(0, -1, x), (0, 0, -2.0 * x), (0, 1, x)],
@@ -150,11 +153,14 @@ def _stencils(dx: float, dy: float) -> list[list[tuple[int, int, float]]]:
 def _equations(
     values: Array, usable: Cells, holes: Cells, stencil: list[tuple[int, int, float]]
 ) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
-    """One second difference wherever it touches a hole: right sides; row, column, entry."""
+    """The equations of one second difference at all places where it touches a hole.
+
+    Returns the right-hand sides; and the row, the column and the value of each matrix entry.
+    """
     unknown = np.flatnonzero(holes)
     row, column = np.unravel_index(unknown, holes.shape)
-    found = [np.stack([row - dy, column - dx], axis=1) for dy, dx, _ in stencil]
-    places = np.unique(np.concatenate(found), axis=0)
+    around = [np.stack([row - dy, column - dx], axis=1) for dy, dx, _ in stencil]
+    places = np.unique(np.concatenate(around), axis=0)
     whole = np.ones(len(places), dtype=bool)
     for dy, dx, _ in stencil:
         whole &= _at(values, usable, places[:, 0] + dy, places[:, 1] + dx)[1]
@@ -163,11 +169,11 @@ def _equations(
     rows, columns, entries = [], [], []
     for dy, dx, weight in stencil:
         y, x = places[:, 0] + dy, places[:, 1] + dx
-        open_ = holes[y, x]
-        right[~open_] -= weight * values[y[~open_], x[~open_]]
-        rows.append(np.flatnonzero(open_))
-        columns.append(np.searchsorted(unknown, y[open_] * holes.shape[1] + x[open_]))
-        entries.append(np.full(int(open_.sum()), weight))
+        in_hole = holes[y, x]
+        right[~in_hole] -= weight * values[y[~in_hole], x[~in_hole]]
+        rows.append(np.flatnonzero(in_hole))
+        columns.append(np.searchsorted(unknown, y[in_hole] * holes.shape[1] + x[in_hole]))
+        entries.append(np.full(int(in_hole.sum()), weight))
     return right, np.concatenate(rows), np.concatenate(columns), np.concatenate(entries)
 
 
@@ -175,7 +181,8 @@ def fill_small_holes(values: Array, missing: Cells, dx: float, dy: float, size: 
     """Fill small holes of values (ny, nx) by a thin plate; both arrays are changed in place.
 
     dx, dy : the cells' sides; size : the longest side of a hole that is filled, map units.
-    The plate bends least of all that carry on the ground around it: a plane stays a plane.
+    Of all surfaces that continue the ground around it, the plate bends least; a plane stays a
+    plane.
     Raises MapError where a hole has too many cells.
     """
     from scipy.sparse import coo_matrix

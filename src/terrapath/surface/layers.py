@@ -1,4 +1,4 @@
-"""Layers: the scalar fields over the plane that a surface is made of, and what costs do to it."""
+"""Layers: the scalar fields over the plane that make up a surface, and its cost layers."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Kind = Literal["rise", "cost"]
 class Layer:
     """One scalar field over the plane.
 
-    The weight multiplies the layer where it becomes a coordinate of R^n: a change of
-    one unit of the layer counts as ``weight`` map units of way. So it is with the kind "rise",
-    whose changes cost. Of the kind "cost" the level costs: lengths are multiplied by the layer
-    to the power of ``weight``.
+    For a layer of the kind "rise", a change along a path costs. The layer times its weight is a
+    coordinate of R^n: a change of one unit counts as ``weight`` map units of travel. For a layer
+    of the kind "cost", the value itself costs: lengths are multiplied by the layer to the power
+    of ``weight``.
     """
 
     name: str
@@ -73,7 +73,7 @@ def weights_of(layers: Sequence[Layer]) -> Array:
     return np.array([layer.weight for layer in layers])
 
 
-# Cost layers: what multiplies the length of a way by its level, on the knots of a surface
+# Cost layers: their values multiply lengths
 
 
 def require_costs(values: Array, x: Array, y: Array, names: Sequence[str]) -> None:
@@ -88,7 +88,7 @@ def require_costs(values: Array, x: Array, y: Array, names: Sequence[str]) -> No
         )
 
 
-# Squares of costs within this are numbers in single precision, too.
+# Up to this, squares of costs are finite in single precision too.
 LARGEST_COST = 1e12
 
 
@@ -113,11 +113,11 @@ def _at_knots(coefficients: Array) -> Array:
 
 
 def limited(logs: Spline) -> Spline:
-    """A spline made to stay, anywhere, between its values at the knots around.
+    """A spline that is limited, everywhere, to the range of its values at the knots around.
 
-    Costs have sharp edges, where an interpolating spline swings below the least of them and
-    so makes ground cheap that is not. Its coefficients are kept within the values of the 3 x 3
-    nodes around each; on smooth ground off the extremes they are there anyway.
+    Costs have sharp edges. There an interpolating spline falls below the least cost, and makes
+    expensive ground cheap. So each coefficient is limited to the range of the values at the
+    3 x 3 knots around it. On smooth ground, away from extremes, this changes nothing.
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
@@ -129,7 +129,7 @@ def limited(logs: Spline) -> Spline:
 
 
 def with_costs(data: Spline, logs: Spline | None) -> Spline:
-    """A surface's data under cost layers: the product of each cost to its weight."""
+    """A surface's data with its cost: the product of the cost layers, each to its weight."""
     if logs is None:
         return data
     total = np.tensordot(logs.weights, logs.coefficients, axes=1)
@@ -139,15 +139,15 @@ def with_costs(data: Spline, logs: Spline | None) -> Spline:
 
 
 class Span(NamedTuple):
-    """What is sure of a surface inside a rectangle, by its coefficients."""
+    """Limits that hold for a surface everywhere inside a rectangle."""
 
-    least: float  # cost
-    steepest: float  # slope of the cost on the plane, 1/map unit
-    rise: float  # how far apart two points' layers are at most, weighted, map units
+    least: float  # the cost is never lower
+    steepest: float  # the slope of the cost on the plane is never larger, 1/map unit
+    rise: float  # the layers of two points never differ by more, weighted, map units
 
 
 def span_within(data: Spline, bounds: Bounds) -> Span:
-    """Bounds on the cost and the layers of a surface with costs, inside a rectangle."""
+    """Limits of the cost and the layers inside a rectangle, from the spline's coefficients."""
     rows = _cells(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.log_cost.shape[1])
     columns = _cells(bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.log_cost.shape[2])
     logs, layers = data.log_cost[0, rows, columns], data.coefficients[:, rows, columns]
@@ -164,9 +164,9 @@ def span_within(data: Spline, bounds: Bounds) -> Span:
 
 
 def _cells(low: float, high: float, origin: float, step: float, count: int) -> slice:
-    """The coefficients of an axis that the cells over [low, high] are made of.
+    """The coefficients along an axis that determine the spline over [low, high].
 
-    The four from a cell's own number on bound the spline in it.
+    In a cell, the spline stays within the range of the four coefficients from its index on.
     """
     first = min(max(math.floor((low - origin) / step) - 1, 0), count - 4)
     last = min(max(math.floor((high - origin) / step) + 1, first), count - 4)

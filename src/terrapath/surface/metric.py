@@ -1,10 +1,11 @@
-"""The metric h on the plane, and the lengths it gives to segments and curves."""
+"""The metric h on the plane, and the lengths of segments and curves under it."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from .._kernels.surface import lengths
 from .._kernels.surface.surfaces import fill_metric
@@ -12,14 +13,14 @@ from ..errors import InputError
 from ..validation import Array, as_points
 from . import Surface
 
-# Relative tolerance of a true length; what is promised is 1e-9.
+# Relative tolerance of a true length; the promised accuracy is 1e-9.
 QUADRATURE_TOLERANCE = 1e-12
 
-# The 7-point rule is first laid over pieces this many features of the surface long.
+# Quadrature starts with pieces that are as long as this many of the surface's smallest features.
 FEATURES_PER_PIECE = 4.0
 
 
-def metric_tensor(surface: Surface, points: Any) -> Array:
+def metric_tensor(surface: Surface, points: npt.ArrayLike) -> Array:
     """The metric h = c^2 (I + sum_k w_k^2 grad x_k grad x_k^T); c is the cost, 1 without costs.
 
     points : (..., 2), map units. Returns (..., 2, 2), without unit.
@@ -31,18 +32,18 @@ def metric_tensor(surface: Surface, points: Any) -> Array:
     return tensors.reshape(*shape, 2, 2)
 
 
-def determinant(surface: Surface, points: Any) -> Array:
+def determinant(surface: Surface, points: npt.ArrayLike) -> Array:
     """The determinant d = det h, the squared ratio of area on the surface to area on the plane.
 
-    With costs it is times c^4. points : (..., 2), map units. Returns (...), without unit.
+    Costs multiply it by c^4. points : (..., 2), map units. Returns (...), without unit.
     Source: paper, section 3.2.
     """
     h = metric_tensor(surface, points)
     return np.asarray(h[..., 0, 0] * h[..., 1, 1] - h[..., 0, 1] ** 2)
 
 
-def inverse_metric_tensor(surface: Surface, points: Any) -> Array:
-    """The inverse h^-1, from the adjugate of h over d. With costs it is times c^-2.
+def inverse_metric_tensor(surface: Surface, points: npt.ArrayLike) -> Array:
+    """The inverse h^-1, as the adjugate of h over d. Costs multiply it by c^-2.
 
     points : (..., 2), map units. Returns (..., 2, 2), without unit. Source: paper, section 3.2.
     """
@@ -54,7 +55,13 @@ def inverse_metric_tensor(surface: Surface, points: Any) -> Array:
     return np.asarray(adjugate / d[..., None, None])
 
 
-def _measure(kernel: Any, surface: Surface, a: Any, b: Any, *options: float) -> Array:
+def _measure(
+    kernel: Callable[..., None],
+    surface: Surface,
+    a: npt.ArrayLike,
+    b: npt.ArrayLike,
+    *options: float,
+) -> Array:
     """Run a kernel over segments a-b, each (..., 2), broadcast against one another."""
     start, end = as_points(a, "a"), as_points(b, "b")
     try:
@@ -70,7 +77,7 @@ def _measure(kernel: Any, surface: Surface, a: Any, b: Any, *options: float) -> 
     return measured.reshape(shape)
 
 
-def line_r(surface: Surface, a: Any, b: Any) -> Array:
+def line_r(surface: Surface, a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
     """Length of the segments a-b under h by the 5-point Newton-Cotes (Boole) rule.
 
     a, b : (..., 2), map units. Returns (...), map units; exact for integrands of degree 5,
@@ -79,21 +86,21 @@ def line_r(surface: Surface, a: Any, b: Any) -> Array:
     return _measure(lengths.fill_line_r, surface, a, b)
 
 
-def chord(surface: Surface, a: Any, b: Any) -> Array:
-    """Euclidean distance in R^n between lifted points: a lower bound of every path's length.
+def chord(surface: Surface, a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
+    """Euclidean distance in R^n between lifted points: a lower bound on every path's length.
 
     a, b : (..., 2), map units. Returns (...), map units.
     """
     return _measure(lengths.fill_chords, surface, a, b)
 
 
-def chord_through(surface: Surface, points: Any) -> float:
-    """A lower bound of every path through points (m, 2), in their order: their chords' sum."""
+def chord_through(surface: Surface, points: npt.ArrayLike) -> float:
+    """A lower bound on every path through points (m, 2) in their order: the sum of the chords."""
     array = as_points(points)
     return float(chord(surface, array[:-1], array[1:]).sum())
 
 
-def segment_lengths(surface: Surface, a: Any, b: Any) -> Array:
+def segment_lengths(surface: Surface, a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
     """True lengths of the segments a-b under h, by adaptive quadrature to 1e-9 relative.
 
     a, b : (..., 2), map units. Returns (...), map units. Source: paper, equation (3).
@@ -102,7 +109,7 @@ def segment_lengths(surface: Surface, a: Any, b: Any) -> Array:
     return _measure(lengths.fill_segment_lengths, surface, a, b, longest, QUADRATURE_TOLERANCE)
 
 
-def curve_length(surface: Surface, points: Any) -> float:
+def curve_length(surface: Surface, points: npt.ArrayLike) -> float:
     """True length under h of the polyline through points (m, 2), map units.
 
     The same as the length of the lifted curve in R^n. Source: paper, equation (3).

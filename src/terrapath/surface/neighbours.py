@@ -1,7 +1,6 @@
-"""Cells and the ones around them: values between cells, and regions grown by a cell.
+"""Cells and their neighbours: values between cells, and regions grown by one cell.
 
-Small enough to write down: SciPy's ndimage, which has both, takes longer to import than a plan
-on a map takes.
+SciPy's ndimage has both, but importing it takes longer than planning on a map.
 """
 
 from __future__ import annotations
@@ -13,25 +12,25 @@ from ..validation import Array
 
 
 def bilinear(values: Array, row: Array, column: Array) -> Array:
-    """Values (ny, nx) between cells, counted from the first; beyond the edge, as at the edge."""
+    """Values (ny, nx) at fractional indices of cells; beyond the edge, the values at the edge."""
     upper, lower, down = _between(row, values.shape[0])
     left, right, across = _between(column, values.shape[1])
-    found: Array = values[upper, left] * (1.0 - down) * (1.0 - across)
-    found += values[upper, right] * (1.0 - down) * across
-    found += values[lower, left] * down * (1.0 - across)
-    found += values[lower, right] * down * across
-    return found
+    result: Array = values[upper, left] * (1.0 - down) * (1.0 - across)
+    result += values[upper, right] * (1.0 - down) * across
+    result += values[lower, left] * down * (1.0 - across)
+    result += values[lower, right] * down * across
+    return result
 
 
 def _between(at: Array, count: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Array]:
-    """The two cells around each place, and how far it is from the first to the second."""
+    """The two cells around each place, and where it lies between them, from 0 to 1."""
     at = np.clip(at, 0.0, count - 1.0)
     first = at.astype(np.intp)
     return first, np.minimum(first + 1, count - 1), at - first
 
 
 def grown(cells: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """The cells (ny, nx) and the eight around each."""
+    """The cells (ny, nx) together with the eight neighbours of each."""
     wider = cells.copy()
     wider[1:] |= cells[:-1]
     wider[:-1] |= cells[1:]

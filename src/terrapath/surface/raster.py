@@ -1,4 +1,4 @@
-"""Rasters: bands on a grid with a place on Earth, on their way to a surface."""
+"""Rasters: bands on a georeferenced grid, from which surfaces are made."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pyproj import CRS
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
     from .holes import Cells
 
 
-SAME_PLACE = 1e-6  # cells
-MOST_DISTORTED = 0.001  # lengths in a map's own projection
-MOST_DISTORTED_UTM = 0.003  # and in transverse Mercator: 500 km from the central meridian
-WORST_SCALE = 0.01  # of a local projection at the map's edge
+SAME_PLACE = 1e-6  # places that differ by less count as equal, cells
+MOST_DISTORTED = 0.001  # relative error of lengths that is allowed in a map's own projection
+MOST_DISTORTED_UTM = 0.003  # in transverse Mercator: 500 km from the central meridian
+WORST_SCALE = 0.01  # in a local projection, at the map's edge
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Cells in rows and columns, as GDAL lays them out.
+    """Cells in rows and columns, as GDAL orders them.
 
-    transform : from (column, row) corners to map coordinates. crs : None where unknown.
-    map_crs : the CRS that the data came in, where it is another one.
+    transform : from (column, row) of cell corners to map coordinates. crs : None where unknown.
+    map_crs : the CRS that the map's file is in, where it is another one.
     """
 
     rows: int
@@ -50,12 +50,12 @@ class Grid:
 
     @property
     def needs_warp(self) -> bool:
-        """Is it in degrees, turned or not true to scale, so that it is not planned on as it is?"""
+        """Is it in degrees, rotated or distorted, so that it must be warped before planning?"""
         return not self.is_upright or self._needs_projection
 
     @cached_property
     def _needs_projection(self) -> bool:
-        """Is it in degrees, or in a projection that lengths are badly off in, as Web Mercator?"""
+        """Is it in degrees, or in a projection that distorts lengths, such as Web Mercator?"""
         if self.crs is None:
             return False
         if self.crs.is_geographic:
@@ -65,7 +65,7 @@ class Grid:
         return self._distortion() > (MOST_DISTORTED_UTM if is_utm else MOST_DISTORTED)
 
     def _distortion(self) -> float:
-        """How far lengths in its projection are off at worst."""
+        """The largest relative error of lengths in its projection."""
         assert self.crs is not None
         worst = worst_scale(self.crs, *self.outline(None, points=5))
         if not math.isfinite(worst):
@@ -78,12 +78,12 @@ class Grid:
 
     @property
     def cell(self) -> float:
-        """Side of the square that is as large as a cell, in the CRS's unit."""
+        """Side of the square with the area of a cell, in the CRS's unit."""
         t = self.transform
         return math.sqrt(abs(t.a * t.e - t.b * t.d))
 
     def reach(self, length: float) -> tuple[int, int]:
-        """How many rows and columns a length on the plane reaches over at most."""
+        """The largest numbers of rows and columns that a length on the plane reaches across."""
         columns, rows = np.meshgrid([0, self.columns - 1], [0, self.rows - 1])
         corner = self._on_plane(columns, rows)
         steps = ((columns, rows + 1), (columns + 1, rows))
@@ -91,7 +91,7 @@ class Grid:
         return math.ceil(length / sides[0]), math.ceil(length / sides[1])
 
     def _on_plane(self, columns: Array, rows: Array) -> Array:
-        """(2, ...): where corners between cells lie on the plane that is planned in."""
+        """(2, ...): where corners of cells lie on the planning plane."""
         x, y = self.place(columns, rows)
         plane = self._plane()
         if self.crs is not None and plane is not None and plane != self.crs:
@@ -99,7 +99,7 @@ class Grid:
         return np.asarray([x, y])
 
     def place(self, column: Array | float, row: Array | float) -> tuple[Array, Array]:
-        """Map coordinates of the corners between cells."""
+        """Map coordinates of the corners of cells."""
         t = self.transform
         columns, rows = np.asarray(column, np.float64), np.asarray(row, np.float64)
         return t.a * columns + t.b * rows + t.c, t.d * columns + t.e * rows + t.f
@@ -108,7 +108,7 @@ class Grid:
         """(column, row) of map coordinates, counted from the first cell's centre."""
         t = self.transform
         area = t.a * t.e - t.b * t.d
-        # Differences first: coordinates are large against cells.
+        # Differences first, because coordinates are large compared with cells.
         along, across = x - t.c, y - t.f
         return (
             (t.e * along - t.b * across) / area - 0.5,
@@ -134,7 +134,7 @@ class Grid:
         return x[known], y[known]
 
     def flipped(self) -> Grid:
-        """The same cells with the rows in the other order."""
+        """The same cells with the rows in reverse order."""
         t = self.transform
         x, y = t.b * self.rows + t.c, t.e * self.rows + t.f
         return replace(self, transform=Affine(t.a, -t.b, x, t.d, -t.e, y))
@@ -144,7 +144,7 @@ class Grid:
         return self if self.transform.e > 0.0 else self.flipped()
 
     def is_same(self, other: Grid) -> bool:
-        """Are the cells the same, in the same order? The CRS is not looked at."""
+        """Are the cells the same, in the same order? The CRS is not compared."""
         if (self.rows, self.columns) != (other.rows, other.columns):
             return False
         corners = np.array([0, self.columns, 0]), np.array([0, 0, self.rows])
@@ -153,7 +153,7 @@ class Grid:
         return off <= SAME_PLACE * self.cell
 
     def window(self, rows: slice, columns: slice) -> Grid:
-        """Some of the rows and columns."""
+        """The grid of some of the rows and columns."""
         t = self.transform
         x, y = self.place(columns.start, rows.start)
         return replace(
@@ -164,7 +164,7 @@ class Grid:
         )
 
     def coarser(self, factor: int) -> Grid:
-        """Cells ``factor`` times as large a side; what is left over at the end is left out."""
+        """Cells ``factor`` times as wide and high; rows and columns left over are dropped."""
         t, k = self.transform, factor
         return replace(
             self,
@@ -181,7 +181,7 @@ class Grid:
         return x, y
 
     def _plane(self) -> CRS | None:
-        """The CRS to plan in: its own where that is true to scale, else a local projection."""
+        """The planning CRS: the grid's own where it is true to scale, else a local projection."""
         if self.crs is None or not self._needs_projection:
             return self.crs
         west, south, east, north = self.extent()
@@ -206,7 +206,7 @@ class Grid:
         return plane
 
     def _off(self, plane: CRS) -> float:
-        """How far lengths are off at worst in a transverse Mercator projection centred here."""
+        """The largest relative error of lengths in a transverse Mercator projection from here."""
         assert self.crs is not None
         x, _ = self.outline(plane)
         radius = self.crs.ellipsoid.semi_major_metre if self.crs.ellipsoid else 6.37e6
@@ -214,7 +214,7 @@ class Grid:
         return 0.5 * float(np.square(x).max()) / radius**2 if len(x) else math.inf
 
     def planning_grid(self) -> Grid:
-        """Upright cells in a plane, rows from south to north: this grid's own where they are."""
+        """The grid to plan on: upright, rows from south to north; this grid's cells if possible."""
         if not self.needs_warp:
             return self.southward()
         from rasterio.warp import calculate_default_transform
@@ -226,7 +226,7 @@ class Grid:
             transform, columns, rows = calculate_default_transform(
                 source_crs, plane_crs, self.columns, self.rows, *self.extent()
             )
-        except Exception as error:  # rasterio lets errors of GDAL's own kind through
+        except Exception as error:  # rasterio passes on GDAL's own types of error
             reason = str(error).split("\n")[0]
             raise MapError(f"the map cannot be brought onto a plane: {reason}") from None
         return Grid(rows, columns, transform, plane, self.map_crs or self.crs).southward()
@@ -237,10 +237,9 @@ LEAST_CELLS = 4
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Bands (layers, rows, columns) as GDAL lays them out; NaN is no-data.
+    """Bands (layers, rows, columns) as GDAL orders them; NaN is no-data.
 
-    transform : from (column, row) corners to map coordinates. crs : None where unknown.
-    map_crs : the CRS that the data came in, where it is another one.
+    transform, crs, map_crs : as in ``Grid``.
     """
 
     bands: Array
@@ -255,7 +254,7 @@ class Raster:
 
     @classmethod
     def from_extent(
-        cls, bands: Array, extent: tuple[float, float, float, float], crs: Any
+        cls, bands: Array, extent: tuple[float, float, float, float], crs: CRS | str | int
     ) -> Raster:
         """A north-up raster over (west, south, east, north), the outer edges of its cells."""
         from rasterio.transform import from_bounds
@@ -265,12 +264,12 @@ class Raster:
 
     @property
     def grid(self) -> Grid:
-        """Where its cells lie."""
+        """The grid of its cells."""
         rows, columns = self.bands.shape[1:]
         return Grid(rows, columns, self.transform, self.crs, self.map_crs)
 
     def needs_warp(self) -> bool:
-        """Is it in degrees or turned, so that it cannot be planned on as it is?"""
+        """Is it in degrees, rotated or distorted, so that it must be warped before planning?"""
         return self.grid.needs_warp
 
     def to_local_metres(self) -> Raster:
@@ -284,7 +283,7 @@ class Raster:
         return Raster.on(target, bands).trimmed()
 
     def trimmed(self) -> Raster:
-        """Without outer rows and columns that hold no data at all."""
+        """The raster without outer rows and columns that hold no data at all."""
         some = ~self._missing()
         if not some.any():
             return self
@@ -293,7 +292,7 @@ class Raster:
         return Raster.on(self.grid.window(*kept), self.bands[:, kept[0], kept[1]])
 
     def _missing(self) -> Cells:
-        """Cells that any layer has no data in."""
+        """Cells where any layer has no data."""
         from .holes import missing_cells
 
         missing = missing_cells(self.bands[0])
@@ -305,14 +304,14 @@ class Raster:
         return None if self.crs is None else Georeference(self.crs, self.map_crs or self.crs)
 
     def _southward(self) -> Raster:
-        """Rows from south to north."""
+        """The raster with rows from south to north."""
         if self.transform.e > 0.0:
             return self
         return Raster.on(self.grid.flipped(), self.bands[:, ::-1])
 
     @property
     def is_complete(self) -> bool:
-        """Has each cell of every layer data?"""
+        """Does every cell of every layer have data?"""
         return all(bool(np.isfinite(band).all()) for band in self.bands)
 
     def _require_cells(self) -> None:
@@ -324,9 +323,9 @@ class Raster:
             )
 
     def _fill(self, size: float, kinds: Sequence[str]) -> Mask | None:
-        """Fill small holes, continue the ground into large ones; the cells that stay blocked.
+        """Fill small holes, and continue the ground into large ones; returns the blocked cells.
 
-        Costs are filled by their logarithms and stay within their range, above 0.
+        Costs are filled in their logarithms. They stay within their range, and so above 0.
         """
         from .holes import continue_into_holes, fill_small_holes, missing_cells
 
@@ -361,9 +360,9 @@ class Raster:
     ) -> Surface:
         """The spline surface through the cell centres; cells without data are blocked.
 
-        kinds : "rise" or "cost" of each layer. fill_holes : the longest side of holes that are
-        filled and free, map units.
-        The raster is used up: its cells without data are given values.
+        kinds : "rise" or "cost" for each layer. fill_holes : holes up to this side are filled and
+        become free, map units.
+        Do not use the raster after this: its cells without data are given values.
         """
         raster = self._southward()
         raster._require_cells()

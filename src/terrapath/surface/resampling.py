@@ -1,4 +1,4 @@
-"""Values of one grid brought onto another, at exactly transformed coordinates."""
+"""Resamples values from one grid to another, at exactly transformed coordinates."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from .holes import continue_into_holes, missing_cells
 from .neighbours import bilinear
 from .raster import SAME_PLACE, Grid
 
-LEAST_FOR_SPLINE = 4  # cells a side
+LEAST_FOR_SPLINE = 4  # cells on a side that a spline needs
 
 
 def _spline_through(values: Array) -> Spline:
-    """The bicubic spline over (column, row), cells counted from the first centre."""
+    """The bicubic spline over (column, row), where the first cell's centre is (0, 0)."""
     rows, columns = values.shape
     x, y = np.arange(columns, dtype=np.float64), np.arange(rows, dtype=np.float64)
     return interpolate(values[None], x, y, np.ones(1))
 
 
 def _spline_at(spline: Spline, column: Array, row: Array, shape: tuple[int, int]) -> Array:
-    """The spline at points; within half a cell of its edge continued by odd reflection."""
+    """The spline at points; up to half a cell beyond its edge it is extended by odd reflection."""
     points = np.stack([column, row], axis=-1)
     nearest = np.clip(points, 0.0, [shape[1] - 1.0, shape[0] - 1.0])
     inside, mirrored = np.empty((len(points), 1)), np.empty((len(points), 1))
@@ -51,11 +51,11 @@ def _source_cells(source: Grid, target: Grid, rows: slice) -> tuple[Array, Array
 
 
 def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: bool) -> None:
-    """Values (rows, columns) of a grid onto another one, into ``out``; NaN is no-data.
+    """Resample values (rows, columns) of one grid to another, into ``out``; NaN is no-data.
 
-    By a bicubic spline, or bilinear, which leaves the range of the values nowhere. Each cell
-    asks at its own centre, and is no-data where that lies in a cell without data or outside.
-    The values are changed: those without data get some.
+    By a bicubic spline or, if ``linear``, bilinearly, so that the range of the values is kept.
+    Each target cell takes the value at its centre; it is no-data where the centre lies in a cell
+    without data, or outside. ``values`` is changed: cells without data are given values.
     """
     missing = missing_cells(values)
     if missing.all():
@@ -76,17 +76,17 @@ def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: b
             np.clip(np.rint(c).astype(int), 0, m) for c, m in zip((row, column), last, strict=True)
         ]
         if spline is None:
-            found = bilinear(values, row, column)
+            sampled = bilinear(values, row, column)
         else:
-            found = _spline_at(spline, column, row, (values.shape[0], values.shape[1]))
-        found[missing[nearest[0], nearest[1]]] = np.nan
+            sampled = _spline_at(spline, column, row, (values.shape[0], values.shape[1]))
+        sampled[missing[nearest[0], nearest[1]]] = np.nan
         block = np.full(inside.shape, np.nan)
-        block[inside] = found
+        block[inside] = sampled
         out[rows] = block.reshape(-1, target.columns)
 
 
 def require_overlap(name: str, source: Grid, target: Grid) -> None:
-    """Raise MapError where a layer covers none of the map."""
+    """Raise MapError where a layer covers no part of the map."""
     x, y = target.outline(source.crs)
     column, row = source.cells(x, y)
     if source.crs is not None and source.crs.is_geographic:

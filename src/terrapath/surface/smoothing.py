@@ -1,4 +1,4 @@
-"""Gaussian smoothing with a stated length scale, and the change that it makes measured."""
+"""Gaussian smoothing with a given length scale, and the size of the change that it makes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Smoothing:
         return meter.smoothing(scale)
 
     def resolution(self, spacing: float) -> float:
-        """The size of the smallest features of samples so far apart, map units."""
+        """The size of the smallest features for samples with this spacing, map units."""
         return max(spacing, self.scale / FEATURES_PER_SCALE)
 
     def __str__(self) -> str:
@@ -52,14 +52,14 @@ class ChangeMeter:
         self._count = 0
 
     def add(self, change: Array) -> None:
-        """Changes (layers, ...) at further samples."""
+        """Add the changes (layers, ...) at more samples."""
         flat = change.reshape(len(self._largest), -1)
         np.maximum(self._largest, np.abs(flat).max(axis=1), out=self._largest)
         self._squares += np.square(flat).sum(axis=1)
         self._count += flat.shape[1]
 
     def smoothing(self, scale: float) -> Smoothing:
-        """What was measured."""
+        """The smoothing, with the changes that were added."""
         rms = np.sqrt(self._squares / self._count)
         return Smoothing(scale, tuple(self._largest.tolist()), tuple(rms.tolist()))
 
@@ -67,9 +67,9 @@ class ChangeMeter:
 def scale_for_step(step: float, cell: float) -> float:
     """The least smoothing, map units, that heights rounded to a step need; 0 for none.
 
-    Rounding is noise of variance step^2/12 a cell. After a Gaussian of standard deviation s
-    it leaves an rms slope of step/sqrt(12) * cell / (s^2 sqrt(8 pi)) along each axis, and s
-    brings that to 1 %. Where s is below half a cell the spline needs none.
+    Rounding is noise of variance step^2/12 in each cell. After smoothing with a Gaussian of
+    standard deviation s its rms slope along each axis is step/sqrt(12) * cell / (s^2 sqrt(8 pi)).
+    The s that makes this 1 % is chosen. If it is below half a cell, the spline needs no smoothing.
     """
     noise = step / math.sqrt(12.0)
     scale = math.sqrt(noise * cell / (SLOPE_ERROR * math.sqrt(8.0 * math.pi)))
@@ -94,10 +94,10 @@ def check_scale(smoothing: float, bounds: Bounds) -> float:
 def _smooth_lines(f: Array, scale: float) -> Array:
     """Lines f (..., count) smoothed along the last axis; scale in samples.
 
-    The line from the first sample to the last is taken off, and what remains is a sum of
-    sines, each damped as a Gaussian damps it. So the values are continued beyond both ends
-    by odd reflection: f(end + t) = 2 f(end) - f(end - t). Any scale is exact, also one below
-    the spacing.
+    The straight line from the first sample to the last is subtracted. The rest is a sum of
+    sines, and each is damped as a Gaussian damps it. This extends the values beyond both ends
+    by odd reflection: f(end + t) = 2 f(end) - f(end - t). It is exact for any scale, also for one
+    below the spacing.
     """
     from scipy.fft import dst, idst
 
@@ -111,7 +111,7 @@ def _smooth_lines(f: Array, scale: float) -> Array:
 
 
 def smooth_in_place(values: Array, dx: float, dy: float, scale: float) -> None:
-    """``smooth`` in the place of the values (layers, ny, nx), block by block."""
+    """As ``smooth``, but changes the values (layers, ny, nx) in place, block by block."""
     for layer in values:
         for rows in blocks(*layer.shape):
             layer[rows] = _smooth_lines(layer[rows], scale / dx)
@@ -123,8 +123,8 @@ def smooth(values: Array, dx: float, dy: float, scale: float) -> Array:
     """Values (layers, ny, nx) on a uniform grid, convolved with a Gaussian.
 
     dx, dy : spacing; scale : standard deviation, all in map units. Beyond the edge the
-    values are continued by odd reflection, so a plane stays a plane up to the edge, and the
-    edge itself is smoothed only along itself.
+    values are extended by odd reflection. So a plane stays a plane up to the edge, and the
+    edge is smoothed only along its own direction.
     """
     smoothed = np.array(values, dtype=np.float64, order="C")
     smooth_in_place(smoothed, dx, dy, scale)

@@ -1,4 +1,4 @@
-"""The surface that a robot moves on, as data that kernels understand."""
+"""The surface that a robot moves on, as data for the kernels."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from .._kernels.surface.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
 from .._support.extras import require_packages
@@ -36,13 +37,13 @@ if TYPE_CHECKING:
 class Fit:
     """How a surface was made, and the largest error that was found.
 
-    Where it was smoothed, ``smoothing`` tells how far the layers moved; the errors leave
-    that out.
+    Where it was smoothed, ``smoothing`` has the change of the layers; the errors do not include
+    it.
     """
 
     method: str
     value_error: float  # in the layers' units
-    gradient_error: float | None = None  # layer units a map unit; None where not measured
+    gradient_error: float | None = None  # layer units per map unit; None where not measured
     smoothing: Smoothing | None = None
 
     def __str__(self) -> str:
@@ -52,12 +53,12 @@ class Fit:
         return text if self.smoothing is None else f"{text}; {self.smoothing}"
 
 
-# A slope above this is no ground: most often a no-data value that a file does not declare.
+# A slope above this is not real ground: most often a no-data value that a file does not declare.
 STEEPEST = 1e12
 
 
 def _steepest_of(coefficients: Array, dx: float, dy: float) -> float:
-    """A bound of the slope of one spline layer, block by block."""
+    """An upper bound on the slope of one spline layer, found block by block."""
     steepest = 0.0
     for rows in blocks(*coefficients.shape):
         block = coefficients[rows.start : rows.stop + 1]
@@ -68,7 +69,7 @@ def _steepest_of(coefficients: Array, dx: float, dy: float) -> float:
 
 
 def _steepest(data: Peaks | Spline) -> float:
-    """A bound of the weighted slope of every layer, layer units/map unit."""
+    """An upper bound on the weighted slope of every layer, layer units/map unit."""
     with np.errstate(over="ignore"):
         if isinstance(data, Peaks):
             amplitude, falloff = np.abs(data.peaks[:, 0]), data.peaks[:, 1]
@@ -115,11 +116,11 @@ class Surface:
         if not steepest <= STEEPEST:
             raise InputError(
                 f"the surface has slopes of up to {steepest:.2g}, over {STEEPEST:g}; check the "
-                "units and the weights, and whether a no-data value is not declared as such"
+                "units and the weights, and whether the map declares its no-data value"
             )
         require_cost_range(self.data)
 
-    # Making one
+    # Constructors
 
     @classmethod
     def from_peaks(
@@ -158,9 +159,9 @@ class Surface:
     @classmethod
     def from_grid(
         cls,
-        values: Any,
-        x: Any,
-        y: Any,
+        values: npt.ArrayLike,
+        x: npt.ArrayLike,
+        y: npt.ArrayLike,
         *,
         smoothing: float | None = None,
         names: Sequence[str] | None = None,
@@ -177,8 +178,8 @@ class Surface:
         equal, the grid is resampled and the error at the samples reported in ``fit``.
         smoothing : standard deviation, map units, of a Gaussian that the layers are convolved
         with; the change that it makes at the samples is reported in ``fit.smoothing``.
-        kinds : of each layer, "rise" (the default) or "cost"; costs are above 0, and between
-        samples stay between those around.
+        kinds : of each layer, "rise" (the default) or "cost". Costs must be above 0; between
+        samples they stay within the range of the samples around.
         """
         array = np.asarray(values)
         if array.ndim == 2:
@@ -203,28 +204,28 @@ class Surface:
             )
         bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
         scale = _scale_of(smoothing, bounds)
-        found = fit_grid(array[~is_cost] if costs else array, x, y, weights_of(rises), scale)
+        fitted = fit_grid(array[~is_cost] if costs else array, x, y, weights_of(rises), scale)
         logs = None
         if costs:
             require_costs(array[is_cost], x, y, [layer.name for layer in costs])
-            given = np.log(array[is_cost])
-            fitted = fit_grid(given, x, y, weights_of(costs), scale, linear=True)
-            logs = limited(fitted.spline)
+            log_values = np.log(array[is_cost])
+            logs = fit_grid(log_values, x, y, weights_of(costs), scale, linear=True).spline
+            logs = limited(logs)
         fit = Fit(
             f"bicubic spline through {len(x)} x {len(y)} samples",
-            found.value_error,
-            smoothing=found.smoothing,
+            fitted.value_error,
+            smoothing=fitted.smoothing,
         )
         spacing = float(max(np.diff(x).max(), np.diff(y).max()))
-        resolution = spacing if found.smoothing is None else found.smoothing.resolution(spacing)
-        data = with_costs(found.spline, logs)
+        resolution = spacing if fitted.smoothing is None else fitted.smoothing.resolution(spacing)
+        data = with_costs(fitted.spline, logs)
         return cls(data, rises, bounds, fit, resolution, nodata, georeference, costs, logs)
 
     @classmethod
     def from_function(
         cls,
-        f: Callable[[Array, Array], Any],
-        bounds: Any,
+        f: Callable[[Array, Array], npt.ArrayLike],
+        bounds: Sequence[float] | Array,
         tolerance: float = 1e-6,
         *,
         gradient: Gradient | None = None,
@@ -233,14 +234,15 @@ class Surface:
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
     ) -> Surface:
-        """A spline that follows f, refined until it meets the tolerance.
+        """A spline that approximates f, refined until it meets the tolerance.
 
         f(x, y) -> (layers, ...) on arrays. tolerance : the largest error of a value (layer
         unit) and of a gradient (layer unit/map unit) at points that the spline was not
-        fitted on. gradient(x, y) -> (2, layers, ...), if known; otherwise differences of f.
+        fitted to. gradient(x, y) -> (2, layers, ...), if known; otherwise finite differences of
+        f are used.
         smoothing : standard deviation, map units, of a Gaussian that f is convolved with,
-        which makes any function smooth enough. Then there is no tolerance to meet and no
-        gradient to check, and ``fit.smoothing`` reports the change that it makes.
+        which makes any function smooth enough. Then the tolerance and the gradient are not
+        used, and ``fit.smoothing`` reports the change that the smoothing makes.
         Raises FitError where f is not smooth enough, InputError where the scale of the
         smoothing needs too many samples.
         """
@@ -248,24 +250,24 @@ class Surface:
         rectangle = as_bounds(bounds)
         scale = _scale_of(smoothing, rectangle)
         if scale > 0.0:
-            found = fit_smoothed(f, rectangle, scale)
+            fitted = fit_smoothed(f, rectangle, scale)
         else:
-            found = fit_function(f, rectangle, tolerance, gradient)
-        made = make_layers(len(found.spline.weights), names, units, weights)
+            fitted = fit_function(f, rectangle, tolerance, gradient)
+        made = make_layers(len(fitted.spline.weights), names, units, weights)
         fit = Fit(
-            "bicubic spline of a function, {} x {} samples".format(*found.samples),
-            found.value_error,
-            found.gradient_error,
-            found.smoothing,
+            "bicubic spline of a function, {} x {} samples".format(*fitted.samples),
+            fitted.value_error,
+            fitted.gradient_error,
+            fitted.smoothing,
         )
-        surface = cls(found.spline, made, rectangle, fit, found.resolution)
+        surface = cls(fitted.spline, made, rectangle, fit, fitted.resolution)
         return surface.with_weights({layer.name: layer.weight for layer in made})
 
     @classmethod
     def from_expression(
         cls,
         expressions: str | Sequence[str],
-        bounds: Any,
+        bounds: Sequence[float] | Array,
         tolerance: float = 1e-6,
         *,
         smoothing: float | None = None,
@@ -273,7 +275,7 @@ class Surface:
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
     ) -> Surface:
-        """As ``from_function``, for SymPy expressions in x1 and x2, one a layer.
+        """As ``from_function``, for SymPy expressions in x1 and x2, one for each layer.
 
         The gradients that the fit is checked against are exact.
         """
@@ -313,14 +315,14 @@ class Surface:
             data = with_costs(data, logs)
         return replace(self, data=data, layers=layers, costs=costs, cost_data=logs)
 
-    # Looking at it
+    # Values and derivatives
 
     @property
     def unit(self) -> str:
         """Unit of lengths on the plane; empty where it is not known."""
         return "" if self.georeference is None else self.georeference.unit
 
-    def _points(self, points: Any) -> tuple[Array, tuple[int, ...]]:
+    def _points(self, points: npt.ArrayLike) -> tuple[Array, tuple[int, ...]]:
         array = as_points(points)
         if self.bounds is not None and not (inside := self.bounds.contains(array)).all():
             x, y = array[~inside][0]
@@ -330,32 +332,32 @@ class Surface:
             )
         return np.ascontiguousarray(array.reshape(-1, 2)), array.shape[:-1]
 
-    def _jets(self, points: Any) -> Array:
+    def _jets(self, points: npt.ArrayLike) -> Array:
         flat, shape = self._points(points)
         jets = np.empty((len(flat), len(self.layers), 6))
         fill_jets(self.data, flat, jets)
         return jets.reshape(*shape, len(self.layers), 6)
 
-    def values(self, points: Any) -> Array:
+    def values(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2), map units -> (..., layers), in the layers' units."""
         flat, shape = self._points(points)
         values = np.empty((len(flat), len(self.layers)))
         fill_values(self.data, flat, values)
         return values.reshape(*shape, len(self.layers))
 
-    def gradients(self, points: Any) -> Array:
+    def gradients(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2) -> (..., layers, 2), layer units/map unit."""
         return self._jets(points)[..., 1:3]
 
-    def hessians(self, points: Any) -> Array:
+    def hessians(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2) -> (..., layers, 2, 2), layer units/map unit^2."""
         return self._jets(points)[..., [[3, 4], [4, 5]]]
 
-    def cost(self, points: Any) -> Array:
-        """Points (..., 2), map units -> (...): what lengths are multiplied by there."""
+    def cost(self, points: npt.ArrayLike) -> Array:
+        """Points (..., 2), map units -> (...): the cost, which multiplies lengths there."""
         return np.asarray(np.exp(self.log_cost_jets(points)[..., 0]))
 
-    def log_cost_jets(self, points: Any) -> Array:
+    def log_cost_jets(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2) -> (..., 6): log of the cost, d/dx1, d/dx2, and second derivatives."""
         flat, shape = self._points(points)
         jets = np.zeros((len(flat), 6))
@@ -363,8 +365,8 @@ class Surface:
             fill_log_costs(self.data, flat, jets)
         return jets.reshape(*shape, 6)
 
-    def cost_values(self, points: Any) -> Array:
-        """Points (..., 2) -> (..., costs): each cost layer's own value, before its weight."""
+    def cost_values(self, points: npt.ArrayLike) -> Array:
+        """Points (..., 2) -> (..., costs): the value of each cost layer, without its weight."""
         flat, shape = self._points(points)
         logs = np.empty((len(flat), len(self.costs)))
         if self.cost_data is not None:
@@ -382,7 +384,7 @@ class Surface:
         logs = self.data.log_cost if isinstance(self.data, Spline) else np.empty(0)
         return math.exp(float(logs.mean())) if logs.size else 1.0
 
-    def lift(self, points: Any) -> Array:
+    def lift(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2) -> (..., n): the points of R^n above them, layers weighted."""
         array = as_points(points)
         return np.concatenate([array, self.values(array) * self.data.weights], axis=-1)

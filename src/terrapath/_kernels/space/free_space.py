@@ -1,7 +1,7 @@
 """Does a segment stay in free space?
 
-Every test errs on one side: a segment is called free only where floating point
-proves it, so a doubtful touch counts as a hit and no path ever has to be excused.
+A segment is called free only where this is certain despite rounding errors. A doubtful case
+counts as a hit, so no path that is returned touches an obstacle.
 Obstacles are closed sets: touching one is a hit.
 """
 
@@ -40,7 +40,7 @@ class Space(NamedTuple):
     circle_ids: np.ndarray
     mask_frames: np.ndarray  # (k, 4) float64: x0, y0, dx, dy of each mask's first cell corner
     mask_shapes: np.ndarray  # (k, 3) int64: nx, ny and the offset in ``blocked``
-    blocked: np.ndarray  # uint8, all masks behind one another, row by row
+    blocked: np.ndarray  # uint8, the cells of all masks one after another, row by row
 
 
 class Span(NamedTuple):
@@ -50,7 +50,7 @@ class Span(NamedTuple):
     last: int
 
 
-# Cells are widened by this share of their size, far above rounding, so that a segment
+# Cells are widened by this share of their size, far above rounding errors, so that a segment
 # that runs along a cell's border counts as crossing the cells on both sides.
 _MARGIN = 1e-7
 
@@ -88,7 +88,7 @@ _ORIENTATION_ERROR = 8.0 * 2.0**-52
 
 @kernel
 def surely_on_one_side(ax, ay, bx, by, cx, cy, dx, dy):
-    """True where c and d are certainly strictly on one side of the line a-b."""
+    """True only where c and d are certainly on the same side of the line a-b, and not on it."""
     left_c, right_c = (bx - ax) * (cy - ay), (by - ay) * (cx - ax)
     left_d, right_d = (bx - ax) * (dy - ay), (by - ay) * (dx - ax)
     side_c, side_d = left_c - right_c, left_d - right_d
@@ -185,7 +185,7 @@ def fill_free(space, a, b, free):
 
 @kernel
 def enlist(item, cell, first, ids):
-    """Count an item of a cell; where ``ids`` is not empty, list it there instead."""
+    """Count an item of a cell; if ``ids`` is not empty, list the item there instead."""
     if ids.shape[0] > 0:
         ids[first[cell]] = item
         first[cell] += 1
@@ -197,7 +197,8 @@ def enlist(item, cell, first, ids):
 def list_edges(grid, edges, first, ids):
     """Count the edges of each cell into first[cell + 1], or list them in ``ids``.
 
-    Called twice: first with an empty ``ids``, to count; then, with ``first`` summed up, to list.
+    Call it twice: first with an empty ``ids``, to count; then with the cumulative sums of the
+    counts in ``first``, to list.
     """
     for e in range(edges.shape[0]):
         ax, ay, bx, by = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
@@ -210,7 +211,7 @@ def list_edges(grid, edges, first, ids):
 
 @kernel
 def list_circles(grid, circles, first, ids):
-    """As ``list_edges``, for the bounding boxes of circles."""
+    """As ``list_edges``, for circles, by their bounding boxes."""
     for c in range(circles.shape[0]):
         x, y, r = circles[c, 0], circles[c, 1], circles[c, 2]
         rows = span(y - r, y + r, grid.y0, grid.dy, grid.ny)

@@ -1,4 +1,4 @@
-"""Uniform bicubic B-splines: what is alive in a cell, and sums over its sixteen coefficients."""
+"""Uniform bicubic B-splines: those that are not 0 in a cell, and sums over its 16 coefficients."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ class Cell(NamedTuple):
 
 @inner_kernel
 def basis(u):
-    """The four uniform cubic B-splines that are alive at u in [0, 1]."""
+    """The values of the four uniform cubic B-splines that are not 0 at u in [0, 1]."""
     constant, linear = four(1 / 6, 2 / 3, 1 / 6, 0.0), four(-0.5, 0.0, 0.5, 0.0)
     square, cube = four(0.5, -1.0, 0.5, 0.0), four(-1 / 6, 0.5, -0.5, 1 / 6)
     return fused(fused(fused(cube, u, square), u, linear), u, constant)

@@ -19,8 +19,8 @@ def norm(h, dx, dy):
 def composite_boole(surface, ax, ay, dx, dy, ends, panels):
     """Line-R with the segment cut into equal panels; ``panels = 1`` is Algorithm 1.
 
-    ends : |v|_h at both ends of the segment, summed, v = (dx, dy) being one panel. It is passed
-    in because a tree knows the metric at its vertices.
+    ends : the sum of |v|_h at both ends of the segment, where v = (dx, dy) is one panel. It is
+    passed in because a tree knows the metric at its vertices.
     """
     length = 7.0 / 90.0 * ends
     weights = four(16.0 / 45.0, 2.0 / 15.0, 16.0 / 45.0, 0.0)
@@ -55,8 +55,9 @@ def chord(surface, ax, ay, bx, by):
 
 
 # Patterson's nested rules on [-1, 1] (1968) with 3, 7 and 15 points, exact for degrees 5, 11
-# and 23. Each keeps the nodes of the one before, so that short segments take seven and others
-# lose nothing. Here is the lower half of the nodes and half of the one in the middle.
+# and 23. Each rule contains the nodes of the one before it. So short segments need only seven
+# evaluations, and for others none of the seven is wasted. Listed is the lower half of the nodes;
+# the weight of the node in the middle is halved.
 _NODES = [
     *(-0.960491268708020283423507092629, -0.774596669241483377035853079956),
     *(-0.434243749346802558002071502845, 0.0),
@@ -82,8 +83,8 @@ _RULES = np.array([_NODES, _THREE, _SEVEN, _FIFTEEN]).reshape(4, 2, 4)
 def integral(surface, x, y, vx, vy, tolerance):
     """The integral of |v|_h from (x, y) - v to (x, y) + v and an estimate of its error.
 
-    The estimate is that of the rule before, so the value is better still. Seven points that
-    are right to the tolerance, relative, are enough.
+    The estimate is the error of the rule with fewer points, so the value is more accurate than
+    that. Seven points are enough where their relative error estimate is within the tolerance.
     """
     three, seven, fifteen = 0.0, 0.0, 0.0
     for k in range(2):
@@ -98,18 +99,18 @@ def integral(surface, x, y, vx, vy, tolerance):
     return fifteen, abs(fifteen - seven)
 
 
-# A piece that is halved no more: far below any feature of a surface.
+# Pieces are not halved beyond this number: they are far smaller than any feature of a surface.
 _MOST_PIECES = 2**40
 
 
 @kernel
 def piece_length(surface, x, y, vx, vy, tolerance):
-    """The integral of |v|_h from (x, y) on by v, by adaptive bisection.
+    """The integral of |v|_h from (x, y) to (x, y) + v, by adaptive bisection.
 
     Pieces are halved until each one's error estimate is under ``tolerance`` times the whole.
     """
     length, allowed = 0.0, 0.0
-    k, pieces = 0, 1  # of the equal pieces the k-th is next
+    k, pieces = 0, 1  # next is the k-th of so many equal pieces
     while k < pieces:
         share = 0.5 / pieces
         middle, wx, wy = (2 * k + 1) * share, share * vx, share * vy
@@ -130,8 +131,8 @@ def piece_length(surface, x, y, vx, vy, tolerance):
 def segment_length(surface, ax, ay, bx, by, longest, tolerance):
     """True length of the segment a-b under h.
 
-    It is cut into pieces of at most ``longest`` on the plane, few enough of the surface's
-    features long that no feature falls between the nodes of the first rule unseen.
+    It is cut into pieces of at most ``longest`` on the plane. That must be only a few times the
+    size of the surface's features, so that the nodes of the first rule miss none of them.
     """
     pieces = max(math.ceil(math.hypot(bx - ax, by - ay) / longest), 1)
     dx, dy = (bx - ax) / pieces, (by - ay) / pieces

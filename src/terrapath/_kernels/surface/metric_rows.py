@@ -1,7 +1,7 @@
 """The metric h at all nodes of a lattice, row by row.
 
-Both surface classes are separable: what depends on x1 alone is computed once for all rows,
-what depends on x2 alone once a row.
+Both surface classes are separable: factors that depend on x1 alone are computed once for all
+rows, and those that depend on x2 alone once for each row.
 """
 
 import math
@@ -13,14 +13,14 @@ from ..dispatch import per_class
 from .bsplines import basis, basis_slope
 from .surfaces import Peaks, Spline, spline_cell
 
-# Places in the rows that are filled in.
+# Indices into the arrays of a row.
 H11, H12, H22, FX, FY = 0, 1, 2, 3, 4
 ROWS = 5
 
 
 @allocating_kernel
 def peaks_columns(surface, grid):
-    """(2 p, nx): a f exp(-f d^2) of each peak, d being the distance along x1, and d times it."""
+    """(2 p, nx): for each peak a f exp(-f d^2), d being the distance along x1, and d times it."""
     columns = np.empty((2 * surface.peaks.shape[0], grid.nx))
     for p in range(surface.peaks.shape[0]):
         amplitude, falloff, centre = surface.peaks[p, 0], surface.peaks[p, 1], surface.peaks[p, 2]
@@ -65,7 +65,7 @@ def fill_peaks_row(surface, grid, j, columns, row):
 
 @allocating_kernel
 def spline_columns(surface, grid):
-    """(11, nx or more): basis and slopes of each column, its cell; below, sums along x2."""
+    """(11, nx or more): basis, slopes and cell of each column; then space for sums along x2."""
     knots = surface.coefficients.shape[2]
     columns = np.zeros((11, max(grid.nx, knots)))
     for i in range(grid.nx):
@@ -92,7 +92,7 @@ def sum_columns(coefficients, j, by, sums):
 
 @kernel
 def fill_spline_slopes(columns, fx, fy):
-    """Slopes along a row from the sums along x2 of values and slopes."""
+    """The slopes of a layer along a row, from the sums along x2."""
     values, slopes = columns[9], columns[10]
     for i in range(fx.shape[0]):
         c = int(columns[8, i])
@@ -134,7 +134,7 @@ def fill_spline_row(surface, grid, j, columns, row):
 
 @per_class({Peaks: peaks_columns, Spline: spline_columns})
 def columns_of(surface, grid):
-    """What the rows of a lattice share."""
+    """The values that depend on x1 alone, which all rows of a lattice share."""
 
 
 @per_class({Peaks: fill_peaks_row, Spline: fill_spline_row})

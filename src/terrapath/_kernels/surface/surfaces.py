@@ -1,8 +1,8 @@
 """The two surface classes, and their values, jets and metric at a point.
 
 A surface s(x1, x2) = (x1, x2, w_3 x_3, ..., w_n x_n) is the graph of n - 2 layers
-over the plane. ``Peaks`` is exact; ``Spline`` carries everything else. On a ``Spline`` lengths
-may be multiplied by a cost c(x1, x2) > 0; its logarithm is a spline, so that it stays above 0.
+over the plane. ``Peaks`` is exact; ``Spline`` is for everything else. On a ``Spline`` lengths
+may be multiplied by a cost c(x1, x2) > 0. The logarithm of c is a spline, so c stays above 0.
 """
 
 import math
@@ -34,7 +34,7 @@ class Spline(NamedTuple):
     dx: float  # knot spacing
     dy: float
     log_cost: np.ndarray  # (0 or 1, ny + 2, nx + 2) float64: log c as one more layer
-    floor: float  # nowhere above c; 1 without a cost
+    floor: float  # a lower bound on c; 1 without a cost
 
 
 class Jet(NamedTuple):
@@ -65,19 +65,19 @@ class Metric(NamedTuple):
 
 
 class Point(NamedTuple):
-    """A point, or four, over peaks."""
+    """A point over peaks, or four points at once."""
 
     x: float
     y: float
 
 
 class Spot(NamedTuple):
-    """A point over a spline: its cell, and what all layers weight their coefficients with."""
+    """A point over a spline: its cell, and the weights of the coefficients, for all layers."""
 
     cell: Cell
-    bx: np.ndarray  # four, as the others: B-splines along x1
+    bx: np.ndarray  # the four B-splines along x1; each of these fields has four numbers
     by: np.ndarray
-    sx: np.ndarray  # their slopes, by map units
+    sx: np.ndarray  # their slopes, 1/map unit
     sy: np.ndarray
 
 
@@ -151,7 +151,7 @@ def spline_spot(surface, x, y):
 
 @inner_kernel
 def sums_and_rises(surface, layer, spot):
-    """Sums over the columns of a cell: of the values, and of their derivatives along y."""
+    """Sums over the columns of a cell: for values, and for derivatives along y."""
     return (
         column_sums(surface.coefficients, layer, spot.cell, spot.by),
         column_sums(surface.coefficients, layer, spot.cell, spot.sy),
@@ -230,7 +230,7 @@ def spline_floor(surface):
 
 @per_class({Peaks: peaks_spot, Spline: spline_spot})
 def spot_at(surface, x, y):
-    """What all layers share at a point; on ``Peaks`` at four of them, too."""
+    """What all layers share at a point; on ``Peaks`` also at four points at once."""
 
 
 @per_class({Peaks: peaks_slope, Spline: spline_slope})
@@ -245,7 +245,7 @@ def jet_at(surface, layer, x, y):
 
 @per_class({Peaks: peaks_slope_along, Spline: spline_slope_along})
 def slope_along(surface, layer, spot, vx, vy):
-    """Derivative of one layer along (vx, vy) (unweighted): less work than both slopes."""
+    """Derivative of one layer along (vx, vy) (unweighted); cheaper than the whole gradient."""
 
 
 @per_class({Peaks: peaks_squared_cost, Spline: spline_squared_cost})
@@ -260,7 +260,7 @@ def log_cost_at(surface, x, y):
 
 @per_class({Peaks: peaks_floor, Spline: spline_floor})
 def floor_of(surface):
-    """A number that c is nowhere below."""
+    """A lower bound on c."""
 
 
 @inner_kernel
@@ -271,7 +271,7 @@ def value_at(surface, layer, spot):
 
 @inner_kernel
 def plus_layer(h, weight, slope):
-    """The metric with one layer more."""
+    """The metric with one more layer."""
     fx, fy = weight * slope.fx, weight * slope.fy
     return Metric(h.h11 + fx * fx, h.h12 + fx * fy, h.h22 + fy * fy)
 
@@ -296,7 +296,10 @@ def metric_at(surface, x, y):
 
 @inner_kernel
 def speed_at(surface, x, y, vx, vy):
-    """|v|_h for v = (vx, vy): c (|v|^2 + sum_k (w_k dx_k(v))^2)^1/2; on ``Peaks`` at four, too."""
+    """|v|_h for v = (vx, vy): c (|v|^2 + sum_k (w_k dx_k(v))^2)^1/2.
+
+    On ``Peaks`` also at four points at once.
+    """
     spot = spot_at(surface, x, y)
     squared = 0.0 * x + (vx * vx + vy * vy)  # a number or four
     for layer in range(surface.weights.shape[0]):
@@ -322,7 +325,7 @@ def spline_speeds_along(surface, x, y, vx, vy, shares):
 
 @per_class({Peaks: peaks_speeds_along, Spline: spline_speeds_along})
 def speeds_along(surface, x, y, vx, vy, shares):
-    """|v|_h at four shares of the segment from (x, y) to (x, y) + v."""
+    """|v|_h at four points of the segment from (x, y) to (x, y) + v, given as shares of it."""
 
 
 @inner_kernel
@@ -344,7 +347,7 @@ def spline_speeds_inside(surface, x, y, vx, vy):
 def speeds_inside(surface, x, y, vx, vy):
     """|v|_h at a quarter, a half and three quarters of the segment from (x, y) to (x, y) + v.
 
-    Of the four numbers returned, the last does not matter.
+    Four numbers are returned; ignore the last one.
     """
 
 

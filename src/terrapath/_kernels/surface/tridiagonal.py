@@ -5,9 +5,9 @@ from ..compiler import kernel
 
 @kernel
 def solve_curvatures(lines, pivots, ratios):
-    """Solve m_(j-1) + 4 m_j + m_(j+1) = r_j for each line, r in lines[:, 2:-2], in its place.
+    """Solve m_(j-1) + 4 m_j + m_(j+1) = r_j for each line; m replaces r in lines[:, 2:-2].
 
-    The matrix is L D L^T: ``pivots`` are the diagonal of D, ``ratios`` lie below that of L.
+    The matrix is L D L^T: ``pivots`` is the diagonal of D, ``ratios`` the one below that of L.
     """
     count = pivots.shape[0]
     for k in range(lines.shape[0]):

@@ -1,4 +1,4 @@
-"""Routes out: one format, one file, and the registry of their writers."""
+"""Writes routes: one module for each format, and the registry of their writers."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ __all__ = [
 
 
 class Writer(NamedTuple):
-    """Where a format is written, and by which packages of the extras."""
+    """The module that writes a format, and the optional packages that it needs."""
 
-    # The module's ``write`` takes a solution that has a path, and a file that exists, empty.
+    # The module's ``write`` takes a solution that has a path, and an empty file that exists.
     module: str
     packages: tuple[str, ...] = ()
 
@@ -44,7 +44,7 @@ def _writer(ending: str) -> ModuleType:
 
 
 def require_known_format(path: Path) -> None:
-    """Raise MapError for an ending that no writer has, MissingExtraError without its packages."""
+    """Raise MapError for an unknown file ending, MissingExtraError if its packages are missing."""
     ending = path.suffix.lower()
     if ending not in WRITERS:
         raise MapError(f"output={str(path)!r} has no known format; end it in {', '.join(WRITERS)}")
@@ -52,17 +52,17 @@ def require_known_format(path: Path) -> None:
 
 
 def require_fitting_format(path: Path, georeference: Georeference | None) -> None:
-    """Raise MapError where a route on this plane has no place in the format (GPX off Earth)."""
+    """Raise MapError where the format cannot hold a route on this plane (GPX off Earth)."""
     require_known_format(path)
     if path.suffix.lower() == ".gpx":
         _writer(".gpx").require_earth(path, georeference)
 
 
 def write_route(solution: Solution, path: str | Path) -> None:
-    """Write a solved route, whole or not at all; the ending names the format.
+    """Write the route of a solution, completely or not at all; the file ending sets the format.
 
     .geojson, .gpkg, .gpx (Earth only), .csv (the profile), .json (all that is known), and
-    .bag2, the folder of a ROS 2 bag. Raises MapError, naming the file and the remedy.
+    .bag2 (a ROS 2 bag, which is a folder). Raises MapError with the file and the remedy.
     """
     target = Path(path)
     require_fitting_format(target, solution.problem.surface.georeference)

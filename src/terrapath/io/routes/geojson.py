@@ -1,4 +1,4 @@
-"""GeoJSON, as RFC 7946 asks: WGS 84, longitude first, cut at the antimeridian."""
+"""GeoJSON, as RFC 7946 requires: WGS 84, longitude first, cut at the antimeridian."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .record import dump, summary
 
 
 def _frame(surface: Surface) -> str:
-    """What the coordinates are."""
+    """The coordinate system, in words."""
     reference = surface.georeference
     if reference is None:
         return "plane, without CRS"
@@ -26,8 +26,8 @@ def _frame(surface: Surface) -> str:
 def _line(parts: list[Part], surface: Surface) -> tuple[dict[str, Any], list[Any]]:
     """The geometry, and heights in the same order and nesting.
 
-    Heights are no third coordinates: those would be metres above the ellipsoid, and the
-    heights of maps are above the sea or whatever the map says.
+    Heights are not third coordinates. Those would be metres above the ellipsoid, but the heights
+    of a map are above sea level, or above what the map defines.
     """
     lines = [part.lonlat.tolist() for part in parts]
     heights = [surface.values(part.points)[:, 0].tolist() for part in parts]

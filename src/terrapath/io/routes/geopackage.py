@@ -1,4 +1,4 @@
-"""GeoPackage, in the CRS that was planned in."""
+"""GeoPackage, in the CRS of the planning plane."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ...surface.georeference import Georeference
 from .profile import clean, distinct, profile_columns
 from .record import dump, summary
 
-# GDAL stamps a file with the day it is written; the same route should give the same bytes.
+# GDAL writes the current date into a file, but the same route should give the same bytes.
 EPOCH = "1970-01-01T00:00:00.000Z"
-# No index of places: routes are small, and an index is one more thing that a full disk cuts off.
+# No spatial index: routes are small, and an index is one more part that a full disk can cut off.
 PLAIN = {"SPATIAL_INDEX": "NO"}
-# Names of columns that are GDAL's own.
+# Column names that GDAL uses itself.
 RESERVED = ("fid", "geom")
 
 Values = npt.NDArray[Any]
@@ -36,7 +36,7 @@ class Layer(NamedTuple):
 
 
 def _attributes(solution: Solution) -> dict[str, Values]:
-    """One row; what has parts becomes JSON text."""
+    """One row of attributes; a list or a dict becomes JSON text."""
     columns = {}
     for key, value in summary(solution).items():
         if isinstance(value, dict | list):
@@ -51,7 +51,7 @@ def _attributes(solution: Solution) -> dict[str, Values]:
 
 
 def _layers(solution: Solution) -> dict[str, Layer]:
-    """By their names."""
+    """The layers of the file, by their names."""
     import shapely
 
     path = solution.path
@@ -69,7 +69,7 @@ def _layers(solution: Solution) -> dict[str, Layer]:
 
 
 def _crs(reference: Georeference | None) -> str | None:
-    """As GDAL writes it: by its code where it has one."""
+    """The CRS as GDAL writes it: as its EPSG code where it has one."""
     if reference is None:
         return None
     code = reference.crs.to_epsg()
@@ -81,7 +81,7 @@ def _write_layer(file: Path, name: str, layer: Layer, crs: str | None) -> None:
     import shapely
 
     columns = layer.columns.values()
-    silence(UserWarning, __name__)  # of a plane that has no CRS: it is so
+    silence(UserWarning, __name__)  # it warns where the plane has no CRS; that is allowed
     pyogrio.raw.write(
         file,
         shapely.to_wkb(layer.geometries),
@@ -97,9 +97,9 @@ def _write_layer(file: Path, name: str, layer: Layer, crs: str | None) -> None:
 
 
 def write(solution: Solution, file: Path) -> None:
-    """Layers ``route``, ``points`` (the profile) and ``waypoints`` (start, via, goal).
+    """Write the layers ``route``, ``points`` (the profile) and ``waypoints`` (start, via, goal).
 
-    Written elsewhere first: SQLite keeps journals beside its files.
+    The file is first made in a temporary folder, because SQLite keeps journals beside its files.
     """
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
@@ -121,9 +121,10 @@ def write(solution: Solution, file: Path) -> None:
 
 
 def _copy_without_dates(database: sqlite3.Connection, file: Path) -> None:
-    """A copy with the same bytes each time: GDAL's option for the date is the whole process's.
+    """Write a copy without the current date, so that its bytes are the same each time.
 
-    The file itself counts its changes, and those of the date are some more or fewer.
+    GDAL has an option for the date, but it applies to the whole process. A fresh copy is needed
+    because an SQLite file counts its changes, and the number of updates of the date varies.
     """
     with database:
         database.execute("UPDATE gpkg_contents SET last_change = ?", [EPOCH])
@@ -131,15 +132,15 @@ def _copy_without_dates(database: sqlite3.Connection, file: Path) -> None:
 
 
 def _require_whole(database: sqlite3.Connection, counts: dict[str, int]) -> None:
-    """Raise OSError where the last of a file is missing: GDAL does not tell what fails at closing.
+    """Raise OSError where the end of a file is missing: GDAL reports no errors when it closes one.
 
-    Then SQLite finds a fault, or what is written last is missing: extents and counts, and the
-    triggers that keep counts, of which each layer has as many as any other.
+    Then SQLite finds a fault, or the parts that are written last are missing: extents, counts,
+    and the triggers that keep the counts. All layers have the same number of triggers.
     """
-    found = "SELECT table_name, feature_count FROM gpkg_contents NATURAL JOIN gpkg_ogr_contents"
+    counted = "SELECT table_name, feature_count FROM gpkg_contents NATURAL JOIN gpkg_ogr_contents"
     triggers = "SELECT count(*) FROM sqlite_master WHERE type = 'trigger' AND tbl_name = ?"
     (verdict,) = database.execute("PRAGMA integrity_check").fetchone()
-    whole = dict(database.execute(f"{found} WHERE min_x IS NOT NULL")) == counts
+    whole = dict(database.execute(f"{counted} WHERE min_x IS NOT NULL")) == counts
     whole &= len({database.execute(triggers, [name]).fetchone() for name in counts}) == 1
     if verdict != "ok" or not whole:
         raise OSError("its last part could not be stored; is the disk full?")

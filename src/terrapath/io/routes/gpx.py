@@ -1,4 +1,4 @@
-"""GPX: a track with elevations, for receivers and outdoor maps. Earth only."""
+"""GPX: a track with elevations, for GPS receivers and outdoor maps. Earth only."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .units import height_metres
 
 
 def require_earth(path: Path, georeference: Georeference | None) -> None:
-    """Raise MapError where there is no WGS 84, which is all that GPX knows."""
+    """Raise MapError where the plane has no WGS 84 coordinates: GPX allows no others."""
     if georeference is not None and georeference.is_earth:
         return
     where = "the map has no CRS" if georeference is None else f"{georeference.name} is not on Earth"
@@ -30,7 +30,7 @@ def require_earth(path: Path, georeference: Georeference | None) -> None:
 
 
 def _places(surface: Surface, points: Array) -> list[dict[str, Any]]:
-    """Degrees, and metres as GPX asks; no elevation where the unit of heights is not known."""
+    """Degrees, and elevations in metres as GPX requires; none where the heights have no unit."""
     reference, metres = surface.georeference, height_metres(surface)
     assert reference is not None
     degrees = np.round(in_degrees(reference, points), DECIMALS).tolist()
@@ -58,7 +58,7 @@ def _description(solution: Solution) -> str:
 
 
 def write(solution: Solution, file: Path) -> None:
-    """The profile as one track; start, via points and goal as waypoints."""
+    """Write the profile as one track; start, via points and goal as waypoints."""
     from gpxpy import gpx
 
     assert solution.path is not None

@@ -1,4 +1,4 @@
-"""Where a route is in degrees, so that straight lines there follow it."""
+"""A route in degrees, with enough points that straight lines between them follow it."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from .units import plane_metres
 
 # Decimals of a degree: a tenth of a millimetre on Earth.
 DECIMALS = 9
-# A straight line of the plane is a curve in degrees; no chord of it may be farther off, metres.
+# A straight line of the plane is a curve in degrees. No chord of it may be farther off, metres.
 LARGEST_SAG = 0.5
-# Rounds of halving. Only a line through a pole needs more, and there is no help for it.
+# Rounds of halving. Only a line through a pole needs more, and for it no number is enough.
 ROUNDS = 12
 
 
 class Part(NamedTuple):
-    """A stretch of a route on one side of the antimeridian."""
+    """A part of a route on one side of the antimeridian."""
 
     lonlat: Array  # (m, 2), degrees, longitude in [-180, 180]
     points: Array  # (m, 2), the same places on the plane, map units
 
 
 def in_degrees(reference: Georeference, points: Array) -> Array:
-    """Plane (m, 2) -> longitude and latitude, degrees; MapError where the plane has none."""
+    """Plane (m, 2) -> longitude and latitude, degrees; MapError where a point has none."""
     lonlat = reference.to_lonlat(points)
     if not np.isfinite(lonlat).all():
         x, y = points[~np.isfinite(lonlat).all(axis=1)][0]
@@ -39,23 +39,23 @@ def in_degrees(reference: Georeference, points: Array) -> Array:
 
 
 def _unwrapped(lonlat: Array) -> Array:
-    """Without jumps by 360 degrees at the antimeridian."""
+    """The same places without jumps of 360 degrees at the antimeridian."""
     return np.column_stack([np.unwrap(lonlat[:, 0], period=360.0), lonlat[:, 1]])
 
 
 def following(reference: Georeference, points: Array) -> Array:
-    """The points, with more between them where the line through their degrees strays."""
+    """The points, and more between them where a straight line in degrees is too far off."""
     metres = plane_metres(reference) or 1.0
     for _ in range(ROUNDS):
         lonlat = _unwrapped(in_degrees(reference, points))
         chords = reference.from_lonlat(0.5 * (lonlat[:-1] + lonlat[1:]))
         middles = 0.5 * (points[:-1] + points[1:])
         sag = metres * np.hypot(*(chords - middles).T)
-        # Not written as sag > ...: what is not a number strays too.
-        strays = np.flatnonzero(~(sag <= LARGEST_SAG))
-        if len(strays) == 0:
+        # Not written as sag > ..., so that NaN counts as too far off.
+        too_far = np.flatnonzero(~(sag <= LARGEST_SAG))
+        if len(too_far) == 0:
             break
-        points = np.insert(points, strays + 1, middles[strays], axis=0)
+        points = np.insert(points, too_far + 1, middles[too_far], axis=0)
     return points
 
 
@@ -74,9 +74,9 @@ def parts_in_degrees(reference: Georeference, points: Array) -> list[Part]:
             current = [cut]
         current.append(b)
     parts.append((turns[-1], current))
-    found = [_part(np.array(stretch), turn) for turn, stretch in parts]
-    # A route that only touches the antimeridian leaves stretches of no length.
-    return [part for part in found if np.ptp(part.lonlat, axis=0).any()] or found[:1]
+    cut_parts = [_part(np.array(stretch), turn) for turn, stretch in parts]
+    # A route that only touches the antimeridian leaves parts of no length.
+    return [part for part in cut_parts if np.ptp(part.lonlat, axis=0).any()] or cut_parts[:1]
 
 
 def _part(stretch: Array, turn: float) -> Part:

@@ -1,4 +1,4 @@
-"""What a traveller meets along a route, column by column."""
+"""The profile of a route as columns: distance, place, height, slopes and further layers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Column(NamedTuple):
 
 
 def headings(points: Array) -> Array:
-    """(m, 2): the unit vector towards the next point; where one stands still, as before."""
+    """(m, 2): unit vectors to the next point; between points at one place, as before them."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(*steps.T)
     moving = np.flatnonzero(lengths > 0.0)
@@ -42,11 +42,11 @@ class Slopes(NamedTuple):
     """Slopes of the first layer at the points of a profile, degrees."""
 
     along: Array  # (m,) in the direction of travel, positive uphill
-    ground: Array  # (m,) of the ground, the steepest way
+    ground: Array  # (m,) of the ground in its steepest direction
 
 
 def slopes(path: Path) -> Slopes:
-    """Slopes along a path; height and plane are alike where a unit is not known."""
+    """Slopes along a path. Where a unit is not known, height and plane are taken to share one."""
     points = path.profile.points
     gradients = height_scale(path.surface) * path.surface.gradients(points)[:, 0]
     along = (gradients * headings(points)).sum(axis=1)
@@ -57,7 +57,7 @@ def profile_columns(solution: Solution) -> list[Column]:
     """Distance, place, height, slopes and every further layer."""
     path, surface = solution.path, solution.problem.surface
     assert path is not None
-    profile, found = path.profile, slopes(path)
+    profile, slope = path.profile, slopes(path)
     columns = [
         Column("distance", "", profile.distance),
         Column("x", "", profile.points[:, 0]),
@@ -67,15 +67,15 @@ def profile_columns(solution: Solution) -> list[Column]:
         longitude, latitude = in_degrees(surface.georeference, profile.points).T
         columns += [Column("longitude", "", longitude), Column("latitude", "", latitude)]
     height = Column(surface.layers[0].name, surface.layers[0].unit, profile.values[:, 0])
-    slope = [
-        Column("slope", "degrees", found.along),
-        Column("ground slope", "degrees", found.ground),
+    steepness = [
+        Column("slope", "degrees", slope.along),
+        Column("ground slope", "degrees", slope.ground),
     ]
-    return [*columns, height, *slope, *further_layers(path)]
+    return [*columns, height, *steepness, *further_layers(path)]
 
 
 def further_layers(path: Path) -> list[Column]:
-    """All layers along the profile but the height: those whose changes cost, then the costs."""
+    """All layers but the height, along the profile: first those whose changes cost, then costs."""
     surface, profile = path.surface, path.profile
     values = [*profile.values.T[1:], *profile.costs.T]
     layers = [*surface.layers[1:], *surface.costs]
@@ -83,18 +83,18 @@ def further_layers(path: Path) -> list[Column]:
 
 
 def clean(text: str) -> str:
-    """On one line, and without letters that no file or screen can show."""
+    """The text on one line, without characters that cannot be printed."""
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
 def distinct(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:
-    """Clean names, numbered where two are alike but for their case."""
-    found: list[str] = []
+    """Clean names; a name that occurs before, in any case of letters, gets a number."""
+    result: list[str] = []
     used = {name.casefold() for name in taken}
     for name in map(clean, names):
         candidate, k = name or "layer", 2
         while candidate.casefold() in used:
             candidate, k = f"{name} ({k})", k + 1
         used.add(candidate.casefold())
-        found.append(candidate)
-    return found
+        result.append(candidate)
+    return result

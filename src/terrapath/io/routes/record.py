@@ -14,8 +14,8 @@ from ... import __version__
 from ...problem import Solution
 
 
-def plain(value: Any) -> Any:
-    """The value as JSON knows it: it has no infinity, no NaN and no arrays."""
+def plain(value: object) -> Any:
+    """The value in JSON's types: infinity and NaN become None, arrays become lists."""
     if isinstance(value, float):  # first, for paths have thousands
         return float(value) if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -34,34 +34,34 @@ def _is_finite(array: NDArray[Any]) -> bool:
     return array.dtype.kind in "fiu" and bool(np.isfinite(array).all())
 
 
-def dump(record: Any) -> str:
-    """Strict JSON; letters that no encoding can hold stay escaped."""
+def dump(record: object) -> str:
+    """Strict JSON in ASCII: other characters are escaped, so any encoding can hold them."""
     return json.dumps(plain(record), allow_nan=False) + "\n"
 
 
 def provenance(solution: Solution) -> dict[str, Any]:
-    """What the route was made by and from. No dates: the same seed gives the same bytes."""
+    """What made the route, and from what. No dates: the same seed gives the same bytes."""
     surface = solution.problem.surface
-    found: dict[str, Any] = {
+    record: dict[str, Any] = {
         "software": f"terrapath {__version__}",
         "planner": solution.planner,
         "samples": solution.samples,
         "seed": solution.seed,
         "layers": {layer.name: layer.weight for layer in surface.layers},
     }
-    known = {
+    optional = {
         "costs": {layer.name: layer.weight for layer in surface.costs},
         "options": solution.options,
         "map": surface.source,
     }
-    found |= {key: value for key, value in known.items() if value}
+    record |= {key: value for key, value in optional.items() if value}
     if surface.georeference is not None:
-        found["planned_in"] = surface.georeference.text
-    return found
+        record["planned_in"] = surface.georeference.text
+    return record
 
 
 def _ends_in_degrees(solution: Solution) -> dict[str, Any]:
-    """The plane's CRS, and what there is in longitude and latitude."""
+    """The plane's CRS, and start, goal and path in longitude and latitude."""
     reference = solution.problem.surface.georeference
     if reference is None:
         return {}
@@ -76,7 +76,7 @@ def _ends_in_degrees(solution: Solution) -> dict[str, Any]:
 
 
 def _corridor(solution: Solution) -> dict[str, Any]:
-    """Where the bound holds, if not everywhere."""
+    """Where the lower bound holds, if not on the whole map."""
     corridor = solution.corridor
     if corridor is None:
         return {}
@@ -90,7 +90,7 @@ def _corridor(solution: Solution) -> dict[str, Any]:
 
 
 def _measures(solution: Solution) -> dict[str, Any]:
-    """How it ended, how long the route is, and how good."""
+    """The status, the lengths of the route, and how close it is proven to be to the best."""
     path = solution.path
     return {
         **_corridor(solution),
@@ -108,7 +108,7 @@ def _measures(solution: Solution) -> dict[str, Any]:
 
 
 def _legs(solution: Solution) -> list[dict[str, Any]]:
-    """One for each leg that was planned."""
+    """One record for each leg that was planned."""
     return [
         {
             "start": leg.problem.start,
@@ -123,13 +123,13 @@ def _legs(solution: Solution) -> list[dict[str, Any]]:
 
 
 def route_record(solution: Solution) -> dict[str, Any]:
-    """All that is known of a solution, ready for JSON.
+    """All that is known about a solution, ready for JSON.
 
-    ``start``, ``goal``, ``via`` and ``path`` are on the plane that was planned in, map units;
+    ``start``, ``goal``, ``via`` and ``path`` are on the planning plane, map units;
     with a georeference ``crs`` names that plane, and ``start_lonlat``, ``goal_lonlat`` and
-    ``path_lonlat`` are longitude and latitude in degrees. ``unrefined_length`` is of the
-    planner's own path where that was refined. ``contributions`` are the shares of the length
-    that the plane and each layer make up. ``legs`` are those of a tour.
+    ``path_lonlat`` are longitude and latitude in degrees. Where the path was refined,
+    ``unrefined_length`` is the length of the planner's own path. ``contributions`` are the shares
+    of the length that come from the plane and from each layer. ``legs`` are those of a tour.
     """
     problem, path = solution.problem, solution.path
     record: dict[str, Any] = {
@@ -151,10 +151,10 @@ def route_record(solution: Solution) -> dict[str, Any]:
 
 
 def summary(solution: Solution) -> dict[str, Any]:
-    """What is known of a route but its points: measures and provenance."""
+    """All that is known about a route except its points: measures and provenance."""
     return dict(plain({**_measures(solution), **provenance(solution)}))
 
 
 def write(solution: Solution, file: Path) -> None:
-    """The record."""
+    """Write the record."""
     file.write_text(dump(route_record(solution)), encoding="utf-8")

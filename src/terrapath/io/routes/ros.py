@@ -14,14 +14,14 @@ from .profile import headings, slopes
 from .units import height_metres, plane_metres
 
 TOPIC, FRAME = "/plan", "map"
-# The oldest that the library writes: every ROS 2 since Humble reads it.
+# The oldest version that the library writes: every ROS 2 since Humble reads it.
 BAG_VERSION: Literal[8] = 8
-# No clock: the same route gives the same bytes, and ROS reads 0 as "whenever".
+# No date: the same route gives the same bytes, and ROS reads time 0 as "any time".
 STAMP = 0
 
 
 def positions(surface: Surface, route: Route) -> Array:
-    """(m, 3): the profile's points in metres; heights without a unit count as the plane does."""
+    """(m, 3): the profile's points in metres; heights without a unit are in the plane's."""
     plane = plane_metres(surface.georeference) or 1.0
     height = height_metres(surface) or plane
     profile = route.profile
@@ -29,7 +29,7 @@ def positions(surface: Surface, route: Route) -> Array:
 
 
 def orientations(route: Route) -> Array:
-    """(m, 4): quaternions x, y, z, w of a vehicle that looks ahead along the ground.
+    """(m, 4): quaternions x, y, z, w of a vehicle that faces along the route, on the ground.
 
     Yaw is counted from the x axis, anticlockwise; nose up is a negative pitch (REP 103).
     """
@@ -68,7 +68,7 @@ def _message(solution: Solution, types: Any) -> Any:
 
 
 def write(solution: Solution, folder: Path) -> None:
-    """A bag in a folder that does not exist yet."""
+    """Write a bag into a folder that does not exist yet."""
     import sqlite3
 
     from rosbags.rosbag2 import StoragePlugin, Writer

@@ -10,7 +10,7 @@ from .profile import distinct, profile_columns
 
 
 def write(solution: Solution, file: Path) -> None:
-    """A row a point; a layer's unit stands in its heading, others are the map's."""
+    """Write one row for each point; a layer's unit is in its heading, the rest in map units."""
     columns = profile_columns(solution)
     rows = zip(*(column.values.tolist() for column in columns), strict=True)
     with file.open("w", newline="", encoding="utf-8") as stream:

@@ -1,4 +1,4 @@
-"""Obstacles and areas from vector files, brought onto the plane that is planned in."""
+"""Obstacles and areas from vector files, on the planning plane."""
 
 from __future__ import annotations
 
@@ -15,33 +15,34 @@ from .plane import Plane, Where, placed
 
 
 def read_obstacles(path: str | Path, where: Where) -> list[BaseGeometry]:
-    """The geometries of a vector file on the plane that is planned in, one a feature.
+    """The geometries of a vector file on the planning plane, one for each feature.
 
-    path : anything GDAL reads as vectors, in any CRS, all layers; or ``FILE:LAYER`` for one of
-    them. where : the surface that is planned on, or its georeference, None for one without.
-    Straight edges of the file stay right to a centimetre; third coordinates are dropped. Only
-    what lies within a map's side of a surface is brought along.
-    Polygons that cross themselves are repaired (RepairedWarning); features without geometry are
-    left out, a file without CRS is taken to be in the map's own coordinates, and obstacles
-    outside the map are told of (VectorWarning).
+    path : a vector file that GDAL reads, in any CRS, for all its layers; or ``FILE:LAYER`` for one
+    of them. where : the surface to plan on, or its georeference; None if it has none.
+    Straight edges of the file are accurate to a centimetre; third coordinates are dropped. For a
+    surface, only geometries within one side of the map around it are kept.
+    Polygons that cross themselves are repaired (RepairedWarning). A VectorWarning tells of
+    features without geometry, which are left out; of a file without a CRS, which is taken to be
+    in the map's own coordinates; and of obstacles outside the map.
     Raises MapError with the file, the reason and the remedy.
     """
     source, plane = Path(path), Plane.of(where)
     layers = list(read_layers(source))
-    found = [shape for layer in layers for shape in placed(layer, plane)]
+    shapes = [shape for layer in layers for shape in placed(layer, plane)]
     if plane.bounds is not None:
-        _tell_of_outsiders(source, found, sum(len(layer.shapes) for layer in layers), plane.bounds)
-    return found
+        count = sum(len(layer.shapes) for layer in layers)
+        _warn_of_obstacles_outside(source, shapes, count, plane.bounds)
+    return shapes
 
 
 def read_area(path: str | Path, where: Where) -> BaseGeometry:
     """The polygons of a vector file, as one area on the plane; otherwise as ``read_obstacles``.
 
-    Raises MapError, too, where the file holds something else than polygons, or the area lies
-    outside the map.
+    Raises MapError also where the file holds geometries other than polygons, or where the area
+    lies outside the map.
     """
     source, plane = Path(path), Plane.of(where)
-    found: list[BaseGeometry] = []
+    polygons: list[BaseGeometry] = []
     for layer in read_layers(source):
         for number, shape in zip(layer.numbers, layer.shapes, strict=True):
             if shape.geom_type not in {"Polygon", "MultiPolygon"}:
@@ -49,23 +50,23 @@ def read_area(path: str | Path, where: Where) -> BaseGeometry:
                     f"{layer.label}: feature {number} is a {shape.geom_type}, which bounds no "
                     "area; give polygons"
                 )
-        found += placed(layer, plane)
-    area = shapely.union_all(found)
+        polygons += placed(layer, plane)
+    area = shapely.union_all(polygons)
     if area.is_empty or (plane.bounds and not shapely.intersects(area, shapely.box(*plane.bounds))):
         raise MapError(f"{source}: the area lies outside the map; check its CRS and the axis order")
     return area
 
 
-def _tell_of_outsiders(
+def _warn_of_obstacles_outside(
     source: Path, shapes: list[BaseGeometry], count: int, bounds: Bounds
 ) -> None:
-    """Where some of the file's obstacles touch no place on the map."""
+    """Warn if some of the file's ``count`` obstacles lie wholly outside the map."""
     frame = shapely.box(*bounds)
     shapely.prepare(frame)
     inside = int(shapely.intersects(frame, np.array(shapes, np.object_)).sum())
     if inside == 0:
-        told = "all obstacles lie outside the map; check the file's CRS and its axis order"
-        tell(VectorWarning(f"{source}: {told}"))
+        text = "all obstacles lie outside the map; check the file's CRS and its axis order"
+        tell(VectorWarning(f"{source}: {text}"))
     elif inside < count:
-        told = f"{count - inside} of {count} obstacles lie outside the map"
-        tell(VectorWarning(f"{source}: {told}"))
+        text = f"{count - inside} of {count} obstacles lie outside the map"
+        tell(VectorWarning(f"{source}: {text}"))

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
@@ -24,16 +23,16 @@ MOST_BYTES = 4 * 2**30
 
 
 class VectorWarning(TerrapathWarning):
-    """A vector file was not taken as it stands: something was assumed, or left out."""
+    """A vector file was not used exactly as it is: something was assumed, or left out."""
 
 
 class RepairedWarning(VectorWarning):
-    """Geometries of a vector file were not valid, and have been repaired."""
+    """Geometries of a vector file were not valid, and were repaired."""
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """The geometries of a layer as the file has them, none empty. numbers : of their features."""
+    """The geometries of a layer in the file's CRS, none empty. numbers : of their features."""
 
     label: str
     driver: str
@@ -57,7 +56,7 @@ def read_layers(path: Path) -> Iterator[Layer]:
 
 
 def _listed(path: Path) -> tuple[Path, list[str]]:
-    """The file and the layers that are asked for."""
+    """The file, and the names of the layers to read."""
     source, wanted = path, ""
     if not path.exists():
         file, _, wanted = str(path).rpartition(":")
@@ -82,7 +81,10 @@ def _listed(path: Path) -> tuple[Path, list[str]]:
 
 
 def _refuse_absurd_sizes(path: Path) -> None:
-    """Before any memory is taken; what is packed counts as it will be unpacked."""
+    """Raise MapError for a file that is too large, before memory is allocated.
+
+    A zip archive counts with its unpacked size.
+    """
     try:
         files = [p for p in path.glob("*") if p.is_file()] if path.is_dir() else [path]
         size = sum(file.stat().st_size for file in files)
@@ -100,7 +102,7 @@ def _refuse_absurd_sizes(path: Path) -> None:
 
 @contextmanager
 def quietly(path: Path) -> Iterator[None]:
-    """GDAL's and GEOS's complaints become one MapError, their warnings are not shown."""
+    """Turn errors of GDAL and GEOS into one MapError, and do not show their warnings."""
     for module in ("pyogrio.core", "pyogrio.raw"):
         silence(RuntimeWarning, module)
     try:
@@ -108,21 +110,21 @@ def quietly(path: Path) -> Iterator[None]:
             yield
     except MapError:
         raise
-    except Exception as error:  # of a foreign file, drivers raise whatever they do
+    except Exception as error:  # for damaged files, drivers raise errors of any type
         raise MapError(
             f"{path} cannot be read as vectors: {reason_of(error)}; check that it is a "
-            "vector file, and whole"
+            "vector file, and complete"
         ) from None
 
 
 def reason_of(error: Exception) -> str:
-    """What an error says, on one short line."""
+    """The message of an error, on one short line."""
     text = " ".join(str(error).split()).rstrip(".") or type(error).__name__
     return text.split("; ")[0][:200]
 
 
 def _read_layer(path: Path, name: str, *, alone: bool) -> Layer | None:
-    """One layer, without features that have no geometry; None where none has one."""
+    """One layer, with those features that have a geometry; None where no feature has one."""
     import pyogrio
 
     label = str(path) if alone else f"{path}:{name}"
@@ -140,14 +142,14 @@ def _read_layer(path: Path, name: str, *, alone: bool) -> Layer | None:
         return None
     if missing.any():
         count = int(missing.sum())
-        told = f"{label}: without geometry and left out: {count} of {len(shapes)} features"
-        tell(VectorWarning(f"{told}, the first is feature {ids[missing][0]}"))
+        text = f"{label}: without geometry and left out: {count} of {len(shapes)} features"
+        tell(VectorWarning(f"{text}, the first is feature {ids[missing][0]}"))
     layer = Layer(label, driver, crs, shapes[~missing], ids[~missing])
-    require_places(layer, "a coordinate that is not finite, or on no map; mend or remove it")
+    require_places(layer, "a coordinate that is not finite, or on no map; repair or remove it")
     return layer
 
 
-def _parsed(crs: Any, label: str) -> CRS | None:
+def _parsed(crs: object, label: str) -> CRS | None:
     if crs is None:
         return None
     try:
@@ -157,7 +159,7 @@ def _parsed(crs: Any, label: str) -> CRS | None:
 
 
 def require_places(layer: Layer, what: str) -> None:
-    """Raise MapError where a coordinate is no place. what : is said of the feature."""
+    """Raise MapError where a coordinate is not finite or too large. what : the feature has it."""
     corners, owners = shapely.get_coordinates(layer.shapes, return_index=True)
     bad = ~(np.abs(corners) < FARTHEST).all(axis=1)
     if bad.any():
@@ -165,23 +167,23 @@ def require_places(layer: Layer, what: str) -> None:
 
 
 def repaired(layer: Layer) -> Layer:
-    """With valid geometries only. What the repair leaves of no extent is left out."""
-    reasons, broken = layer.shapes, np.flatnonzero(~shapely.is_valid(layer.shapes))
+    """The layer with valid geometries only; those that the repair leaves empty are left out."""
+    broken = np.flatnonzero(~shapely.is_valid(layer.shapes))
     if len(broken) == 0:
         return layer
     with quietly(Path(layer.label)):
-        reason = shapely.is_valid_reason(reasons[broken[0]])
+        reason = shapely.is_valid_reason(layer.shapes[broken[0]])
         mended = shapely.make_valid(layer.shapes[broken], method="structure", keep_collapsed=True)
     shapes = layer.shapes.copy()
     shapes[broken] = [with_extent(shape) for shape in mended]
-    told = f"{layer.label}: not valid, and repaired: {len(broken)} of {len(shapes)} geometries"
-    tell(RepairedWarning(f"{told}, the first is feature {layer.numbers[broken[0]]}: {reason}"))
+    text = f"{layer.label}: not valid, and repaired: {len(broken)} of {len(shapes)} geometries"
+    tell(RepairedWarning(f"{text}, the first is feature {layer.numbers[broken[0]]}: {reason}"))
     kept = ~shapely.is_empty(shapes)
     return replace(layer, shapes=shapes[kept], numbers=layer.numbers[kept])
 
 
 def with_extent(shape: BaseGeometry) -> BaseGeometry:
-    """The polygons of a geometry, else its lines."""
+    """The polygons of a geometry; where it has none, its lines."""
     parts, _ = simple_parts(np.array([shape], np.object_), np.zeros(1, np.int64))
     dimensions = shapely.get_dimensions(parts)
     parts = parts[dimensions == dimensions.max(initial=1)]

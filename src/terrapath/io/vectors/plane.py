@@ -1,4 +1,4 @@
-"""From a layer's CRS onto the plane that is planned in, so that straight edges stay right."""
+"""Transforms a layer from its CRS to the planning plane, and keeps straight edges accurate."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from .layers import (
     with_extent,
 )
 
-# A straight edge of the file, bent by the projection, is followed to this distance, metres.
+# The projection bends a straight edge of the file. It is followed to this distance, metres.
 TOLERANCE = 0.01
 MOST_ROUNDS = 12
 MOST_CORNERS = 20_000_000
-# Where along an edge it is looked at how far it bends: no bend is small at both places.
+# The shares of an edge at which its bend is measured: no bend is small at both.
 PLACES = (0.3, 0.6)
 
-# Around the map what is brought along reaches as far as this share of the map's longer side.
+# Geometries are kept up to this far around the map, as a share of the map's longer side.
 MARGIN = 1.0
 
-# Formats whose coordinates are said to be WGS 84 whatever they are.
+# Formats that always declare WGS 84, even where the coordinates are on another body.
 EARTHLY_FORMATS = ("GeoJSON", "GeoJSONSeq", "KML", "LIBKML")
 
 Where: TypeAlias = Surface | Georeference | None
@@ -48,14 +48,14 @@ Move: TypeAlias = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Plane:
-    """What is planned in."""
+    """The planning plane: its georeference and the bounds of the map, where they are known."""
 
     georeference: Georeference | None
     bounds: Bounds | None
 
     @classmethod
     def of(cls, where: Where) -> Plane:
-        """Of a surface, or of what it may carry."""
+        """From a surface, a georeference or None."""
         if where is None or isinstance(where, Georeference):
             return cls(where, None)
         if isinstance(where, Surface):
@@ -63,7 +63,7 @@ class Plane:
         raise InputError(f"where={where!r} is neither a Surface nor a Georeference")
 
     def crs_of(self, layer: Layer) -> CRS | None:
-        """The CRS that a layer comes in; None where it is the plane's own, or there is none."""
+        """The CRS of a layer; None where it is the plane's own, or where neither has one."""
         reference = self.georeference
         if reference is None:
             if layer.crs is not None:
@@ -75,12 +75,12 @@ class Plane:
         crs = layer.crs
         if crs is None:
             crs = reference.map_crs
-            told = f"{layer.label} has no CRS and is taken to be in the map's own coordinates"
-            tell(VectorWarning(f"{told}, {crs.name}"))
+            text = f"{layer.label} has no CRS and is taken to be in the map's own coordinates"
+            tell(VectorWarning(f"{text}, {crs.name}"))
         elif layer.driver in EARTHLY_FORMATS and not reference.is_earth and _is_wgs84(crs):
             crs = reference.crs.geodetic_crs or reference.map_crs
-            told = f"{layer.label} cannot name another body than Earth"
-            tell(VectorWarning(f"{told} and is taken as longitude and latitude of {crs.name}"))
+            text = f"{layer.label} cannot name another body than Earth"
+            tell(VectorWarning(f"{text} and is taken as longitude and latitude of {crs.name}"))
         return None if crs == reference.crs else crs
 
 
@@ -89,7 +89,7 @@ def _is_wgs84(crs: CRS) -> bool:
 
 
 def placed(layer: Layer, plane: Plane) -> list[BaseGeometry]:
-    """The geometries of a layer on the plane."""
+    """The geometries of a layer, transformed to the plane."""
     crs = plane.crs_of(layer)
     if crs is None:
         return list(layer.shapes)
@@ -121,7 +121,7 @@ def placed(layer: Layer, plane: Plane) -> list[BaseGeometry]:
 
 
 def _region(transformer: Transformer, bounds: Bounds) -> Bounds | None:
-    """Where in the file's CRS the map lies, and around it; None where that is no rectangle."""
+    """The map and its surroundings as a rectangle in the file's CRS; None where it is none."""
     reach = MARGIN * max(bounds.width, bounds.height)
     x0, y0, x1, y1 = bounds
     low, high = (x0 - reach, y0 - reach), (x1 + reach, y1 + reach)
@@ -133,13 +133,13 @@ def _region(transformer: Transformer, bounds: Bounds) -> Bounds | None:
 
 
 def _clipped(layer: Layer, region: Bounds) -> Layer:
-    """Without what lies far from the map, where projections give nonsense."""
+    """The layer without what lies far from the map, where projections are not valid."""
     frame = shapely.box(*region)
     near = shapely.intersects(layer.shapes, frame)
     shapes, numbers = layer.shapes[near], layer.numbers[near]
     reaching = ~shapely.covered_by(shapes, frame)
     cut = shapely.intersection(shapes[reaching], frame)
-    # What only touches the frame leaves points and lines there, far outside the map.
+    # A geometry that only touches the frame leaves points or lines there, far outside the map.
     same = shapely.get_dimensions(cut) == shapely.get_dimensions(shapes[reaching])
     shapes[reaching] = [
         with_extent(shape) if kept and shape.geom_type == "GeometryCollection" else shape
@@ -151,7 +151,7 @@ def _clipped(layer: Layer, region: Bounds) -> Layer:
 
 
 def _with_more_corners(layer: Layer, move: Move, tolerance: float) -> Layer:
-    """With so many corners that straight edges follow the bent ones to the tolerance."""
+    """The layer with enough corners that straight edges follow bent ones to the tolerance."""
     shapes = layer.shapes.copy()
     for _ in range(MOST_ROUNDS):
         longest = _longest_edges(shapes, move, tolerance)
@@ -168,7 +168,7 @@ def _with_more_corners(layer: Layer, move: Move, tolerance: float) -> Layer:
 
 
 def _longest_edges(shapes: Geometries, move: Move, tolerance: float) -> Array:
-    """How long edges of each shape (m,) may be, infinite where they are short enough."""
+    """(m,): how long the edges of each shape may be; infinite where they are short enough."""
     parts, owners = simple_parts(shapes, np.arange(len(shapes)))
     is_point = np.isin(shapely.get_type_id(parts), POINTS)
     lines, which = outlines(parts[~is_point])
