@@ -19,7 +19,7 @@ def test_a_certificate_is_proven_again(proof, capsys):
     assert run(["check", "one-peak", str(proof), "--goal", "9,8"]) == 0
     table = capsys.readouterr().out
     assert f"{tp.Certificate.load(proof).value:.6f}" in table
-    for word in ("holds", "proven bound", "dual norm", "cells", "seconds"):
+    for word in ("holds", "lower bound", "dual norm", "cells", "seconds"):
         assert word in table
 
 

@@ -161,7 +161,7 @@ def test_warming_up_compiles_once_and_then_says_that_all_are_there(kitchen, tmp_
     assert said.err == ""
     assert run(["warmup"]) == 0
     assert kitchen == ["one", "two"]
-    assert "all kernels are there: 2.0 MB" in capsys.readouterr().out
+    assert "all kernels are compiled already: 2.0 MB" in capsys.readouterr().out
     assert run(["warmup", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
 

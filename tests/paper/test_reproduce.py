@@ -113,7 +113,7 @@ def test_ctrl_c_keeps_the_trials_and_says_how_to_go_on(tmp_path, workers):
     stopped = run_program(program(tmp_path, "signal.raise_signal(signal.SIGINT)", workers))
     assert stopped.returncode == 130
     assert "Traceback" not in stopped.stderr
-    assert "the same command goes on from there" in stopped.stderr
+    assert "the same command continues from there" in stopped.stderr
     assert len(stopped.stderr.splitlines()) == 1
     kept = list((tmp_path / "trials").iterdir())
     assert len(kept) >= 4

@@ -70,7 +70,7 @@ def test_it_ends_with_the_context_whatever_happens():
 
 @pytest.mark.usefixtures("two_cores")
 def test_one_that_hangs_is_not_waited_for_for_ever(monkeypatch):
-    monkeypatch.setattr(second_core, "PATIENCE", 0.05)
+    monkeypatch.setattr(second_core, "LONGEST_WAIT", 0.05)
     with SecondCore(NOTHING) as second:
         second.start()
         process = second.process

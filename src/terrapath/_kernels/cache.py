@@ -26,7 +26,7 @@ from numba import __version__ as numba_version, config
 from ..errors import KernelWarning, tell
 from .fallback import is_plain
 
-# Tells of each kernel that is compiled, for it was not found in the cache.
+# Logs each kernel that is compiled because the cache does not hold it.
 _LOG = logging.getLogger("terrapath.kernels")
 
 # Called with the name of each such kernel before it is compiled.
@@ -57,7 +57,7 @@ STAMP = package_stamp()
 
 @cache
 def _own_stamp(source: Path) -> str:
-    """Hash of a file that is no part of the package, which a test's kernels are in."""
+    """Hash of a file outside the package, as tests have with kernels of their own."""
     if source.is_relative_to(_KERNELS):
         return ""
     return hashlib.sha256(source.read_bytes()).hexdigest()
@@ -69,11 +69,12 @@ def environment() -> str:
 
 
 @cache
-def _environment(way: str) -> str:
+def _environment(compilation: str) -> str:
     from numba.core.registry import cpu_target
 
     target = cpu_target.target_context.codegen().magic_tuple()
-    return "; ".join([STAMP, way, numba_version, platform.python_version(), *map(str, target)])
+    parts = [STAMP, compilation, numba_version, platform.python_version(), *map(str, target)]
+    return "; ".join(parts)
 
 
 def _short(text: str) -> str:
@@ -89,7 +90,7 @@ def directory() -> Path:
         from numba.core.caching import FunctionCache
 
         return Path(FunctionCache(package_stamp).cache_path)
-    except Exception:  # there is no place that can be written to, or Numba is another one
+    except Exception:  # Numba finds no folder that it can write to, or has changed
         return _KERNELS / "__pycache__"
 
 
@@ -97,14 +98,14 @@ def directory() -> Path:
 
 
 def _checksum(path: Path, content: bytes) -> bytes:
-    """Of the name, too: a file that was put in another's place is as wrong as a damaged one."""
+    """Of name and content: a file under another file's name is as wrong as a damaged one."""
     return hashlib.sha256(path.name.encode() + b"\n" + content).digest()
 
 
 def read_sound(path: Path) -> bytes | None:
     """What was written to a file; None where it is missing, damaged or cannot be read."""
     try:
-        if not path.is_file():  # a pipe would be waited for
+        if not path.is_file():  # to read a pipe is to wait for it
             return None
         whole = path.read_bytes()
     except (OSError, MemoryError):
@@ -158,14 +159,14 @@ def _failed(error: Exception) -> None:
 
 
 class KernelCache:
-    """The machine code of one kernel. It stands where a dispatcher of Numba has its own cache."""
+    """The machine code of one kernel, in place of the cache of Numba's dispatcher."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
 
     @property
     def cache_path(self) -> str:
-        """The folder, by the name that Numba gives it."""
+        """The folder; Numba asks for it by this name."""
         return str(directory())
 
     def _path(self, types: tuple[Any, ...]) -> Path | None:
@@ -184,10 +185,10 @@ class KernelCache:
         return directory() / f"{name}.{unique}{_ENDING}"
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """What Numba compiled, if it is there."""
+        """What Numba compiled; None where the cache does not hold it."""
         try:
             found = self._load(_types(signature), context)
-        except Exception:  # made by something else than it says
+        except Exception:  # its content is not what its name says
             found = None
         if found is not None:
             statistics["loaded"] += 1
@@ -202,7 +203,7 @@ class KernelCache:
         """Machine code from the disk.
 
         Numba would first import all that it can compile, and SciPy's linear algebra with it.
-        That takes as long as a plan, and what is linked whole needs none of it.
+        That takes as long as a plan. Finished machine code needs none of it.
         """
         from numba.core.compiler import CompileResult
 
@@ -232,5 +233,5 @@ class KernelCache:
 
 
 def _types(signature: Any) -> tuple[Any, ...]:
-    """Types of the arguments, of a whole signature or of these alone."""
+    """Types of the arguments, whether given a whole signature or only them."""
     return tuple(getattr(signature, "args", signature))

@@ -1,4 +1,4 @@
-"""The one decorator that every kernel carries, and which way of compiling it stands for."""
+"""The decorators of kernels, and how they compile: by ``linking`` or plainly by Numba."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Kernel = Callable[..., Any]
 
 @cache
 def _linking() -> ModuleType | None:
-    """The quick way of compiling; None where it does not go with the installed Numba."""
+    """The module that compiles fast; None where it does not work with the installed Numba."""
     require_tested_version()
     if is_plain():
         return None
@@ -54,8 +54,8 @@ def _compile(function: Kernel, *, inline: bool = False, allocates: bool = False)
 def kernel(function: Kernel) -> Kernel:
     """Compile ``function`` at its first call and keep the machine code on disk.
 
-    No ``fastmath`` and no contraction: the same inputs give the same bits everywhere
-    the compiler runs, which determinism rests on.
+    No ``fastmath`` and no contraction: results must be reproducible, so the same inputs give
+    the same bits wherever the compiler runs.
     """
     return _compile(function)
 
@@ -68,7 +68,7 @@ def allocating_kernel(function: Kernel) -> Kernel:
 def inner_kernel(function: Kernel) -> Kernel:
     """A kernel that is always inlined: for the innermost loops, where a call costs.
 
-    A surface handed through a call is a structure of arrays; inlining the metric
+    A surface is a structure of arrays, which is slow to pass to a call. Inlining the metric
     halves the time of an edge.
     """
     return _compile(function, inline=True)

@@ -20,9 +20,9 @@ def dispatch({arguments}):
 def per_class(implementations: dict[type, Kernel]) -> Callable[[Kernel], Kernel]:
     """Turn a declaration ``f(surface, ...)`` into dispatch on the surface's class.
 
-    Compiled callers resolve it at compile time, and call the implementation itself; plain
-    Python looks the class up. A surface is a ``NamedTuple`` of arrays and never a callback,
-    which is what lets a compiled planner be found in the cache by the next process.
+    Compiled callers choose the implementation at compile time and call it directly; plain
+    Python looks the class up. A surface is a ``NamedTuple`` of arrays and never a callback.
+    Therefore the next process can find a compiled planner in the cache.
     """
 
     def select(surface: types.Type) -> types.Dispatcher | None:

@@ -1,8 +1,8 @@
-"""Which of two ways kernels are compiled in: linked from parts, or plainly as Numba does.
+"""How kernels are compiled: linked from parts, or plainly, as Numba does by itself.
 
-Linking (``linking.py``) is several times as fast, but it overrides what Numba keeps to itself
-and may change. So it is taken with the versions it was tested with, and left where it fails.
-The plain way asks Numba for nothing special and gives the same answers.
+Linking (``linking.py``) is several times as fast, but it overrides internals of Numba, which may
+change. So it is used only with the versions that it was tested with, and not where it fails.
+Plain compilation needs nothing special of Numba and gives the same answers.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from numba import __version__ as numba_version
 from ..errors import KernelWarning, tell
 
 # The first version of Numba that linking is tested with, and the first that it is not tested
-# with any more. pyproject.toml declares the same, and a test holds them together.
+# with any more. pyproject.toml declares the same, and a test compares the two.
 TESTED_FROM, TESTED_BELOW = (0, 63), (0, 69)
 
-# Why linking was left, if it was.
+# Why linking is not used; empty where it is.
 _reasons: list[str] = []
 
 
@@ -41,7 +41,7 @@ def _warn(reason: object) -> None:
     )
     tell(
         KernelWarning(
-            f"kernels are compiled in a slower way, with the same answers: {reason}; install "
+            f"kernels are compiled more slowly, with the same answers: {reason}; install "
             f"'numba{wanted}'"
         )
     )
@@ -49,7 +49,7 @@ def _warn(reason: object) -> None:
 
 @contextmanager
 def falling_back(error: Exception) -> Iterator[None]:
-    """Try the plain way after an error; where that fails too, the kernel itself is wrong."""
+    """Compile plainly after an error; where that fails too, the kernel itself is wrong."""
     _reasons.append(describe(error))
     try:
         yield
@@ -72,6 +72,6 @@ def is_tested(version: str) -> bool:
 
 
 def require_tested_version() -> None:
-    """Fall back where the installed Numba is none of them."""
+    """Fall back where the installed Numba is not a tested version."""
     if not is_tested(numba_version):
         fall_back(f"numba {numba_version} is not a version they are tested with")

@@ -1,10 +1,10 @@
-"""Kernels that are linked from the kernels they call, by what Numba keeps to itself.
+"""Kernels that are linked from the kernels they call, through internals of Numba.
 
 Numba makes machine code of every function that a compiled one calls, optimised together with
-all that it calls in turn: what lies at the bottom of six calls is optimised seven times, and
-nobody ever runs six of them. So a kernel has two sides here. Python calls the dispatcher,
-which makes machine code and keeps it on disk; kernels call its ``_Part``, which stops at
-LLVM's intermediate code. That is optimised once, in the machine code of who calls it.
+all that it calls in turn. A function at the bottom of six calls is optimised seven times, and
+six of the results never run. So a kernel has two sides here. Python calls the dispatcher,
+which makes machine code and keeps it on disk. Kernels call its ``_Part``, which stops at
+LLVM's intermediate code; that is optimised once, in the machine code of its caller.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ from .signatures import Target, Typing
 Function = Callable[..., Any]
 
 
-# How Numba's names of environments begin: what a function needs of the module it stands in.
+# The beginning of Numba's names for environments. A function's environment holds what it needs
+# of its module.
 _ENVIRONMENT = "_ZN08NumbaEnv"
 
 
@@ -42,12 +43,12 @@ class _Library(JITCodeLibrary):
 
     def add_linking_library(self, library: Any) -> None:
         super().add_linking_library(library)
-        # Callers before what they call: LLVM links what something refers to already.
+        # Callers before what they call: LLVM links only what is already referred to.
         if isinstance(library, _PartLibrary):
             self._linking_libraries.extend(library._linking_libraries)
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Only what is needed to link: all is optimised at once, later."""
+        """Do only what linking needs: everything is optimised together, later."""
         ll_module.data_layout = self._codegen._data_layout
 
 
@@ -55,13 +56,13 @@ class _KernelLibrary(_Library):
     """Machine code, for Python."""
 
     def _optimize_final_module(self) -> None:
-        """All passes at once; Numba's own, cheap ones before them are for counted references.
+        """Run all passes at once, without Numba's cheap ones for reference counting.
 
-        Environments that nothing refers to may go, which are those of all parts: they are for
-        errors that kernels do not raise, and each is made anew where the kernel is loaded.
-        Parts are for this kernel alone, which LLVM must know: then it puts one that is called
-        once in place of its call, and hands on no more of a surface and a tree than is read.
-        Calls with all of their arrays took a third of a tree's time.
+        Environments that nothing refers to may go. Those are the environments of all parts: they
+        are for errors, which kernels do not raise, and loading the kernel would make each anew.
+        LLVM must also know that no other kernel uses these parts. Then it inlines a part that is
+        called once, and passes on only those arrays of a surface and a tree that are read.
+        Passing on all arrays took a third of a tree's time.
         """
         for variable in self._final_module.global_variables:
             if variable.name.startswith(_ENVIRONMENT):
@@ -73,7 +74,7 @@ class _KernelLibrary(_Library):
         passes.run(self._final_module, builder)
 
     def _get_module_for_linking(self) -> Any:
-        """What is kept beside the machine code: names alone, for callers link the part."""
+        """What is kept beside the machine code: only names, because callers link the part."""
         names = [function.name for function in self.get_defined_functions()]
         return parse_assembly("".join(f'define void @"{n}"() {{ ret void }}\n' for n in names))
 
@@ -88,15 +89,15 @@ class _PartLibrary(_Library):
 
 
 def _start_runtime() -> None:
-    """What machine code that makes arrays needs first: an allocator, which is compiled, too."""
+    """Start what machine code that makes arrays needs: an allocator, which is compiled, too."""
     rtsys.initialize(CPUDispatcher.targetdescr.target_context)
 
 
 # Numba's passes for what no kernel has: contexts, closures, branches that types decide, loops over
-# tuples of several types, calls to put in place of themselves, expressions with whole arrays. They
-# change nothing here, and took a tenth of the time: each looks through all of a function, and Numba
-# works out anew after it where each variable lives.
-_SPARED = frozenset(
+# tuples of several types, calls that Numba inlines, expressions with whole arrays. They change
+# nothing here, and took a tenth of the time: each reads the whole function, and after each Numba
+# computes again where every variable is in use.
+_LEFT_OUT = frozenset(
     {
         "with_lifting",
         "inline_closure_likes",
@@ -114,7 +115,7 @@ _SPARED = frozenset(
 
 
 class _LibraryCompiler(Compiler):
-    """A compiler that keeps what it makes in a library of ours, and does only what kernels need."""
+    """A compiler that writes into a library of ours, and runs only the passes that kernels need."""
 
     def __init__(self, typing: Context, target: CPUContext, *rest: Any) -> None:
         super().__init__(Typing(typing), Target(target), *rest)
@@ -122,29 +123,29 @@ class _LibraryCompiler(Compiler):
     def define_pipelines(self) -> list[PassManager]:
         pipelines = super().define_pipelines()
         for pipeline in pipelines:
-            pipeline.passes = [p for p in pipeline.passes if p[0].name() not in _SPARED]
+            pipeline.passes = [p for p in pipeline.passes if p[0].name() not in _LEFT_OUT]
         return pipelines
 
     def _use(self, library: _Library) -> None:
         if self.state.flags.nrt:
-            library._reload_init.add(_start_runtime)  # also by who links it and is loaded
+            library._reload_init.add(_start_runtime)  # callers that link it do so, too
         self.state.library = library
 
 
 class _KernelCompiler(_LibraryCompiler):
-    """What makes a kernel that Python calls."""
+    """The compiler of kernels that Python calls."""
 
     def compile_extra(self, function: Function) -> CompileResult:
         library = _KernelLibrary(self.state.targetctx.codegen(), function.__qualname__)
         library.enable_object_caching()
         self._use(library)
-        with _garbage_left():
+        with _collection_paused():
             return super().compile_extra(function)
 
 
 @contextmanager
-def _garbage_left() -> Iterator[None]:
-    """No look for garbage meanwhile: a compiler makes many objects, and a quarter longer so."""
+def _collection_paused() -> Iterator[None]:
+    """Pause garbage collection, which would make a compilation take a quarter longer."""
     if not gc.isenabled():
         yield
         return
@@ -152,19 +153,19 @@ def _garbage_left() -> Iterator[None]:
     try:
         yield
     finally:
-        _call_old()
+        _leave_to_full_collection()
         gc.enable()
 
 
-def _call_old() -> None:
-    """Leave all objects to the next full collection, for the next small one would look at them."""
-    if not gc.get_freeze_count():  # else they would thaw that somebody froze
+def _leave_to_full_collection() -> None:
+    """Move all objects to the oldest generation, so that the next small collection is fast."""
+    if not gc.get_freeze_count():  # otherwise objects that the caller froze would be unfrozen
         gc.freeze()
         gc.unfreeze()
 
 
 class _PartCompiler(_LibraryCompiler):
-    """What makes a kernel that kernels call."""
+    """The compiler of parts, which kernels call."""
 
     def compile_extra(self, function: Function) -> CompileResult:
         library = _PartLibrary(self.state.targetctx.codegen(), function.__qualname__)
@@ -172,15 +173,15 @@ class _PartCompiler(_LibraryCompiler):
         self.state.flags.no_compile = True
         result = super().compile_extra(function)
         library.finalize()
-        # Callers find it by its entry point, which here is nothing that can be called.
+        # Callers find a part by its entry point: here the library, which Python cannot call.
         self.state.targetctx.insert_user_function(library, result.fndesc, [library])
         return result._replace(entry_point=library)
 
 
 def _settled(kind: types.Type) -> types.Type:
-    """One type for all integers, whatever their width and even where their value is known.
+    """One type for all integers, whatever their width, and also where their value is known.
 
-    Each combination of types would be compiled apart.
+    Otherwise each combination of types would be compiled separately.
     """
     kind = types.unliteral(kind)
     if isinstance(kind, types.Integer) and kind.signed:
@@ -195,7 +196,7 @@ class _Part(CPUDispatcher):
         return super().get_call_template(tuple(map(_settled, args)), kws)
 
     def compile(self, args: tuple[types.Type, ...]) -> Any:
-        """Without clocks, which would look at each other where parts call parts."""
+        """Compile without Numba's timers, which would disturb each other where parts call parts."""
         if args not in self.overloads:
             with self._compiling_counter:
                 result = self._compiler.compile(args, None)
@@ -204,7 +205,7 @@ class _Part(CPUDispatcher):
 
 
 class LinkedKernel(CPUDispatcher):
-    """The side of a kernel that Python calls; kernels are handed on to another one."""
+    """The side of a kernel that Python calls; other kernels are given its part."""
 
     @cached_property
     def part(self) -> _Part:
@@ -250,9 +251,9 @@ def link(
 ) -> LinkedKernel:
     """Declare a kernel.
 
-    Without Numba's run-time counting of references, which a call with a surface and a tree
-    spends more time on than on its work: the caller holds all arrays, and only a kernel that
-    makes one of its own needs the counting. Numba refuses to compile one that does without.
+    allocates : it makes arrays of its own. Only such a kernel needs Numba's reference counting,
+    because callers hold all other arrays; Numba refuses to compile it without. The counting takes
+    longer than the work itself where a call has a surface and a tree.
     """
     options = {
         "nopython": True,

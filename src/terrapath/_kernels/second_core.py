@@ -1,8 +1,9 @@
 """A second process that compiles kernels while this one compiles others.
 
-Numba compiles on one core. So what is needed later is rehearsed beside what is needed now, and
-both keep their kernels in the same cache. Whatever becomes of the second process, this one
-compiles what it does not find: it may lose time, never an answer.
+Numba compiles on one core. So the second process compiles what is needed later while this one
+compiles what is needed now, into the same cache. It does so by a *rehearsal*: small work that
+uses the kernels. Whatever happens to the second process, this one compiles what it does not
+find: it may lose time, never an answer.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ from typing import Self
 
 from . import cache
 
-# What the second process runs, with the names of rehearsals: a package above this one, so by name.
+# What the second process runs, with the names of rehearsals. It uses a package above this one, so
+# it cannot be imported here.
 REHEARSALS = "terrapath.planners.warmup"
 
-# Seconds that are waited for a process that does not end by itself.
-PATIENCE = 120.0
+# The longest time to wait for the second process, seconds.
+LONGEST_WAIT = 120.0
 
 
 def rehearsal_name(work: str, surface_class: str) -> str:
@@ -37,10 +39,10 @@ def cores() -> int:
 
 
 class SecondCore:
-    """Rehearsals by their names in `warmup`, in a process that starts with the first compilation.
+    """A context: the first compilation in it starts a second process with these rehearsals.
 
-    That is while the context lasts and until ``wait``, and only where there are two cores.
-    So nothing is started where all kernels are in the cache.
+    rehearsals : their names in `warmup`. The process starts only where there are two cores, and
+    not after ``wait``. Where all kernels are in the cache nothing is compiled, so none is started.
     """
 
     def __init__(self, *rehearsals: str) -> None:
@@ -65,8 +67,8 @@ class SecondCore:
         self._start_no_more()
         if not self.rehearsals or not sys.executable or cores() < 2:
             return
-        # Without the working directory among the places to import from. Its standard input ends
-        # when this process does, however it does.
+        # Nothing is imported from the working directory. The standard input of the second process
+        # closes when this process ends, however that happens.
         command = [sys.executable, "-P", "-m", REHEARSALS, *self.rehearsals]
         nowhere = subprocess.DEVNULL
         with suppress(OSError):
@@ -75,11 +77,11 @@ class SecondCore:
             )
 
     def wait(self) -> None:
-        """Until the kernels are there, or will not be."""
+        """Wait until the second process has compiled its kernels, or has failed to."""
         self._start_no_more()
         if self.process is not None:
             with suppress(subprocess.TimeoutExpired):
-                self.process.wait(PATIENCE)
+                self.process.wait(LONGEST_WAIT)
         self._end()
 
     def _start_no_more(self) -> None:
@@ -98,7 +100,7 @@ class SecondCore:
 
 
 def serve_first_core() -> None:
-    """Be the second process: end with the first, and at once where no kernel can be kept."""
+    """Be the second process: end when the first does, and at once where no kernel can be kept."""
     threading.Thread(target=_end_with_the_first, daemon=True).start()
     cache.listeners.append(_require_keeping)
 

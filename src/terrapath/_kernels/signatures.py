@@ -1,7 +1,7 @@
-"""Numba's two views of functions, the one for types and the one for code, with a memory.
+"""Numba's two contexts, for types and for code, with a memory for what they find out.
 
-Numba tries anew at each ``+`` whether it is one of arrays, of dates or of two lists: once to
-find the types of a kernel's variables, and again to find the code that adds them.
+At each ``+`` Numba tries again whether it adds arrays, dates or lists: once to find the types of
+a kernel's variables, and once more to find the code that adds them.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from numba.core.datamodel import models, register_default
 from numba.core.typing.context import Context
 from numba.core.typing.templates import Signature
 
-# The type of what one of Numba's own functions returns, by its type and those of its arguments.
+# The signatures of Numba's own functions, by the type of the function and those of its arguments.
 _found: dict[tuple[types.Function, tuple[types.Type, ...]], Signature] = {}
 
 
 class Typing(Context):
-    """What is known of types."""
+    """Numba's context for types, with the memory."""
 
     def __init__(self, context: Context) -> None:
-        self.__dict__ = context.__dict__  # all that it knows, and what it learns later
+        self.__dict__ = context.__dict__  # shared: all that it knows, now and later
 
     def resolve_function_type(self, function: Any, args: tuple[types.Type, ...], kws: Any) -> Any:
         if kws or not isinstance(function, types.Function):
@@ -36,7 +36,7 @@ class Typing(Context):
 
 
 class _Remembered(types.Function):
-    """One of Numba's own functions, which looks into the memory for its signatures."""
+    """One of Numba's own functions, which looks up its signatures in the memory."""
 
     _function: types.Function
 
@@ -44,18 +44,18 @@ class _Remembered(types.Function):
         return context.resolve_function_type(self._function, args, kws)
 
 
-register_default(_Remembered)(models.OpaqueModel)  # as of any function: it has no value
+register_default(_Remembered)(models.OpaqueModel)  # like any function, it has no value
 
 
 @cache
 def _remembered(function: types.Function) -> types.Function:
-    known = object.__new__(_Remembered)  # a type called is interned, and would be numbered anew
+    known = object.__new__(_Remembered)  # to call a type would intern it under a new number
     known.__dict__ |= {**function.__dict__, "_function": function}
     return known
 
 
 class _CodeTyping(Typing):
-    """What is known of types where code is made."""
+    """The context for types while code is made."""
 
     def resolve_value_type(self, value: Any) -> types.Type:
         kind = super().resolve_value_type(value)
@@ -63,11 +63,11 @@ class _CodeTyping(Typing):
 
 
 class Target(CPUContext):
-    """What is known of code."""
+    """Numba's context for code, with the memory."""
 
     def __init__(self, context: CPUContext) -> None:
         self.__dict__ = {**context.__dict__, "typing_context": _CodeTyping(context.typing_context)}
 
     def get_function(self, function: Any, signature: Signature, _firstcall: bool = False) -> Any:
-        """Without a look for new libraries at each function that is not known yet."""
+        """Do not look for new libraries at each function that is not known yet."""
         return super().get_function(function, signature, _firstcall=False)

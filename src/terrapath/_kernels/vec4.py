@@ -1,10 +1,10 @@
 """Four numbers at once: an array (4,) in plain Python, one vector in compiled kernels.
 
 LLVM turns loops over arrays into vector instructions, but neither a sum over the sixteen
-coefficients of a spline nor an exponential in the middle of a formula. Each function here is
-what it says in Python; ``_lowered_by`` tells the compiler the instructions to put in its
-place. A number beside a ``Four`` stands for four of it. Every operation on fours is one that
-IEEE 754 defines, in a fixed order, so their bits are the same on every processor.
+coefficients of a spline nor an exponential in the middle of a formula. In Python each function
+here runs as it is written; ``_lowered_by`` gives the compiler the instructions that replace it.
+A number beside a ``Four`` stands for four equal numbers. IEEE 754 defines every operation on a
+``Four``, and their order is fixed, so the bits are the same on every processor.
 """
 
 import math
@@ -24,7 +24,7 @@ _VECTOR, _BITS = ir.VectorType(_DOUBLE, 4), ir.VectorType(ir.IntType(64), 4)
 
 
 class FourType(types.Type):
-    """What the compiler knows four numbers by."""
+    """The compiler's type of four numbers."""
 
     def __init__(self):
         super().__init__("Four")
@@ -71,7 +71,7 @@ def _lowered_by(build, resolve, *kinds):
 
 
 def _all_four(*args):
-    """Fours in, a Four out, where any argument is one."""
+    """A ``Four`` is returned, and all arguments become one, where any argument is one."""
     return signature(_FOUR, *[_FOUR] * len(args)) if _FOUR in args else None
 
 
@@ -177,7 +177,7 @@ def _total(context, builder, signature, args):
 
 @_lowered_by(_total, lambda v: signature(types.float64, _FOUR), FourType)
 def total(v):
-    """The sum of the four, the first with the third and the second with the fourth first."""
+    """The sum of the four: (first + third) + (second + fourth)."""
     return (v[0] + v[2]) + (v[1] + v[3])
 
 
@@ -199,7 +199,7 @@ def _of_number_or_four(build):
 
 # Cody and Waite (1980): e^x = 2^n e^r with n = round(x / log 2), so that |r| <= (log 2) / 2;
 # there the Taylor polynomial of degree 13 is within 1e-17. log 2 is split such that n times
-# its first part is exact. A large number is added for its last bits to hold n.
+# its first part is exact. A large number is added, so that the last bits of the sum hold n.
 _LOWEST, _HIGHEST = -708.0, 709.0
 _SHIFT = 1.5 * 2.0**52
 _LOG2_HIGH, _LOG2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
@@ -232,7 +232,7 @@ def _exp(context, builder, signature, args):
 
 @_of_number_or_four(_exp)
 def exp(x):
-    """e^x of a number or of four: these within 1e-15, between e^-708 and e^709."""
+    """e^x of a number or of four. Of four: within 1e-15, and limited to e^-708 to e^709."""
     return np.exp(x)
 
 

@@ -1,4 +1,4 @@
-"""Floor 8: the ``terrapath`` command."""
+"""The ``terrapath`` command: parse, call, print, exit code."""
 
 from .main import main
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from ..scenario.scenario import assembled
-from .console import ExitCode, compiling_told
+from ..scenario.scenario import Given, assembled
+from .console import ExitCode, compiling_announced
 from .options import Where, with_options
 
 
@@ -17,17 +17,19 @@ from .options import Where, with_options
 def check_command(
     where: Where,
     certificate: Annotated[
-        Path, typer.Argument(metavar="CERTIFICATE", help="What `plan --certificate` wrote, .npz.")
+        Path,
+        typer.Argument(metavar="CERTIFICATE", help="A file that `plan --certificate` wrote, .npz."),
     ],
-    given: dict[str, dict[str, Any]],
+    given: Given,
     leg: Annotated[
-        int | None, typer.Option(metavar="K", help="Of a tour: the leg that is proven, from 1.")
+        int | None,
+        typer.Option(metavar="K", help="The leg of a tour that the certificate proves, from 1."),
     ] = None,
 ) -> int:
     """Prove a lower bound again, from nothing but the problem and its certificate.
 
-    Give the problem's options as they were given to `terrapath plan`. Exit codes: 0 it holds,
-    2 it does not, or is no certificate of this problem, 5 standard output is closed or full.
+    Give the same options for the problem as to `terrapath plan`. Exit codes: 0 the certificate
+    holds, 2 it does not, or it belongs to another problem, 5 standard output is closed or full.
     """
     from ..certificates.certificate import Certificate
     from ..scenario.answers import check
@@ -36,7 +38,7 @@ def check_command(
     scenario = assembled(where, given)
     loaded = Certificate.load(certificate)
     started = time.perf_counter()
-    with compiling_told():
+    with compiling_announced():
         problem = check(scenario, loaded, leg=leg)
     print_check(problem, loaded, time.perf_counter() - started)
     return ExitCode.SOLVED

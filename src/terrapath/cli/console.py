@@ -1,4 +1,4 @@
-"""What a person sees on the terminal beside the answer: lines, progress bars, exit codes."""
+"""What the command shows besides the answer: lines, progress bars, exit codes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, TextIO
+from types import TracebackType
+from typing import TYPE_CHECKING, TextIO
 
 from .._support.watching import Watch, watch_nothing
 from ..errors import TerrapathWarning, told_to
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ExitCode(enum.IntEnum):
-    """The documented codes."""
+    """The exit codes of the command."""
 
     SOLVED = 0
     BAD_INPUT = 2
@@ -34,7 +35,7 @@ class ExitCode(enum.IntEnum):
 
 
 def remark(message: object) -> None:
-    """One line on standard error, if anybody takes it."""
+    """Print one line on standard error, unless that is closed."""
     with suppress(OSError):
         print("terrapath:", " ".join(str(message).split()), file=sys.stderr)
 
@@ -55,19 +56,21 @@ def remarks() -> Iterator[None]:
 
 @contextmanager
 def without_broken_messages() -> Iterator[None]:
-    """Silence where a message of GDAL is no text, as of a damaged file that it quotes.
+    """Print nothing where a message of GDAL is not text, because it quotes a damaged file.
 
-    Rasterio decodes messages in a callback of GDAL, whatever its log's level. Where that fails
-    Python prints it, by both hooks of the interpreter. They are the process's: only the command,
-    whose process it is, sets them.
+    Rasterio decodes messages in a callback of GDAL, whatever the level of its log. Where that
+    fails, Python prints the error through two hooks of the interpreter. The hooks belong to the
+    process, so only the command may set them.
     """
     uncaught, unraisable = sys.excepthook, sys.unraisablehook
 
-    def of_uncaught(kind: Any, error: Any, trace: Any) -> None:
+    def of_uncaught(
+        kind: type[BaseException], error: BaseException, trace: TracebackType | None
+    ) -> None:
         if not issubclass(kind, UnicodeDecodeError):
             uncaught(kind, error, trace)
 
-    def of_unraisable(what: Any) -> None:
+    def of_unraisable(what: sys.UnraisableHookArgs) -> None:
         if "rasterio" not in str(what.object):
             unraisable(what)
 
@@ -79,9 +82,10 @@ def without_broken_messages() -> Iterator[None]:
 
 
 def settle(*streams: TextIO | None) -> None:
-    """Flush for the last time; what a stream does not take goes nowhere.
+    """Flush for the last time; drop what a stream cannot take.
 
-    Python flushes once more at its end: what fails then is a complaint, and another exit code.
+    Python flushes once more when it ends. Where that failed, it would print an error and change
+    the exit code.
     """
     for stream in streams:
         if stream is None:  # closed from the beginning
@@ -89,7 +93,7 @@ def settle(*streams: TextIO | None) -> None:
         try:
             stream.flush()
         except OSError:
-            with suppress(OSError):  # one that is no file
+            with suppress(OSError):  # the stream is no file
                 os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
@@ -97,12 +101,12 @@ def settle(*streams: TextIO | None) -> None:
 
 
 def is_watched(quiet: bool) -> bool:
-    """Does somebody see what is drawn?"""
+    """Are progress bars to be drawn? Only on a terminal, and not with --quiet."""
     return not quiet and sys.stderr.isatty()
 
 
 def make_bars(prefix: str = "", *, transient: bool = True) -> Bars:
-    """Bars with what is done of how much, and the time. transient : they vanish at the end."""
+    """Progress bars with the count and the time. transient : they are removed at the end."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -117,7 +121,7 @@ def make_bars(prefix: str = "", *, transient: bool = True) -> Bars:
 
 @contextmanager
 def bar_for_all(what: str, quiet: bool) -> Iterator[Watch]:
-    """A watcher that draws one bar, which names what is done and the stage it is at."""
+    """A watcher that draws one bar, with the name of the work and its present stage."""
     if not is_watched(quiet):
         yield watch_nothing
         return
@@ -132,7 +136,7 @@ def bar_for_all(what: str, quiet: bool) -> Iterator[Watch]:
 
 @contextmanager
 def bar_for_each(quiet: bool) -> Iterator[Watch]:
-    """A watcher that draws one bar a stage; they stay."""
+    """A watcher that draws one bar for each stage; the bars stay."""
     if not is_watched(quiet):
         yield watch_nothing
         return
@@ -149,14 +153,14 @@ def bar_for_each(quiet: bool) -> Iterator[Watch]:
 
 @contextmanager
 def progress_bar(quiet: bool) -> Iterator[Callback | None]:
-    """A callback that draws a planner's progress; None where nobody is watching."""
+    """A callback that draws a planner's progress; None where no bar is to be drawn."""
     if not is_watched(quiet):
         yield None
         return
     from ..planners.base import SEARCHING
 
     with make_bars() as bar:
-        # Until the first report the kernels are loaded, or compiled where they are new.
+        # Before the first report, kernels are loaded, or compiled if they are not in the cache.
         task = bar.add_task("preparing kernels", total=None)
 
         def show(progress: Progress) -> None:
@@ -169,7 +173,7 @@ def progress_bar(quiet: bool) -> Iterator[Callback | None]:
 
 
 def _describe(progress: Progress) -> str:
-    """Which leg it is, what is being done, and how good the best path is."""
+    """The leg, the stage, and how good the best path is."""
     from ..planners.base import SEARCHING
 
     leg = f"{progress.leg}: " if progress.leg else ""
@@ -195,24 +199,24 @@ LOGGER = "terrapath.kernels"
 
 
 @contextmanager
-def compiling_told(quiet: bool = False) -> Iterator[None]:
-    """Say once on standard error that kernels are compiled, if any are and somebody watches."""
+def compiling_announced(quiet: bool = False) -> Iterator[None]:
+    """Say once on standard error that kernels are compiled, if any are and bars are drawn."""
     if not is_watched(quiet):
         yield
         return
     import logging
 
-    class Teller(logging.Handler):
+    class Announcer(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             logger.removeHandler(self)
             remark("compiling kernels, once; `terrapath warmup` does it for all commands")
 
-    logger, teller = logging.getLogger(LOGGER), Teller()
+    logger, announcer = logging.getLogger(LOGGER), Announcer()
     before = logger.level
     logger.setLevel(logging.INFO)
-    logger.addHandler(teller)
+    logger.addHandler(announcer)
     try:
         yield
     finally:
-        logger.removeHandler(teller)
+        logger.removeHandler(announcer)
         logger.setLevel(before)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from ..scenario.outputs import FieldOutputs
-from ..scenario.scenario import assembled
-from .console import ExitCode, compiling_told
+from ..scenario.scenario import Given, assembled
+from .console import ExitCode, compiling_announced
 from .options import Where, with_options
 
 
@@ -23,20 +23,21 @@ from .options import Where, with_options
 )
 def field_command(
     where: Where,
-    given: dict[str, dict[str, Any]],
+    given: Given,
     output: Annotated[
         list[Path] | None,
         typer.Option(metavar="FILE", help="Write .tif (GeoTIFF) or .npz; may be repeated."),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw it: .png, .svg, .pdf or .jpg.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the field: .png, .svg, .pdf or .jpg."),
     ] = None,
 ) -> int:
     """Compute the distance field: the least length from the start to every node of a lattice.
 
-    Of a scenario file only the map, the start, the bounds, the constraints and the spacing
-    count. Exit codes: 0 done, 2 bad input, 5 standard output is closed or full (all files are
-    written), 130 interrupted (nothing is written).
+    From a scenario file, only the map, the start, the bounds, the constraints and the spacing
+    are used. Exit codes: 0 done, 2 bad input, 5 standard output is closed or full (all files
+    are written), 130 interrupted (nothing is written).
     """
     scenario = assembled(where, given)
     outputs = FieldOutputs(output or [], plot)
@@ -45,7 +46,7 @@ def field_command(
     from .report import print_field
 
     started = time.perf_counter()
-    with compiling_told():
+    with compiling_announced():
         field = field_of(scenario)
     seconds = time.perf_counter() - started
     try:

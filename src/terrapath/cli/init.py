@@ -18,17 +18,17 @@ def init_command(
     ],
     output: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The scenario file, .toml [default: named as the map]."),
+        typer.Option(
+            metavar="FILE", help="The scenario file, .toml [default: named after the map]."
+        ),
     ] = None,
     crs: Annotated[
         str | None,
-        typer.Option(metavar="CRS", help="CRS of a map that names none, as EPSG:32617."),
+        typer.Option(metavar="CRS", help="CRS of a map that has none, such as EPSG:32617."),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Take the place of a file that exists.")
-    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
 ) -> int:
-    """Write a scenario of a map: every key with its help, and a route that can be planned.
+    """Write a scenario file for a map: every key with its help, and a route that can be planned.
 
     Exit codes: 0 written, 2 bad input.
     """

@@ -14,11 +14,11 @@ from .. import __version__
 from ..errors import TerrapathError
 from .console import ExitCode, remark, remarks, settle, without_broken_messages
 
-# Typer brings its own copy of Click, or uses the installed one, by version; the base of
-# its usage errors is reached through the one it exports.
+# Some versions of Typer bring their own copy of Click, and others use the installed one. So the
+# class is taken from Typer: it is the base of a usage error that Typer exports.
 UsageError: Any = typer.BadParameter.__mro__[1]
 
-# Each stands in a module of its name, as ``plan_command`` in ``plan``.
+# Each is in the module of its name, such as ``plan_command`` in ``plan``.
 COMMANDS = ("plan", "check", "field", "init", "schema", "scenes", "reproduce", "warmup")
 
 
@@ -30,14 +30,15 @@ def _show_version(wanted: bool) -> None:
 
 def _root(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show it.")
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
     pass
 
 
 def application(names: Iterable[str] = COMMANDS) -> typer.Typer:
-    """The command with some of its sub-commands; only their modules are imported."""
+    """The command with some of its sub-commands; no other modules are imported."""
     app = typer.Typer(
         help="Optimal paths on terrain, with proof.",
         add_completion=False,
@@ -52,19 +53,19 @@ def application(names: Iterable[str] = COMMANDS) -> typer.Typer:
     return app
 
 
-def _asked(arguments: list[str]) -> Iterable[str]:
-    """The sub-commands that must be known to answer: the one that is called, or all."""
+def _needed(arguments: list[str]) -> Iterable[str]:
+    """The sub-commands to import: the one that is called, or all."""
     return arguments[:1] if arguments[:1] and arguments[0] in COMMANDS else COMMANDS
 
 
 def _fail(message: str) -> int:
-    """One line on standard error."""
+    """Print the message, and return the exit code for bad input."""
     remark(message)
     return ExitCode.BAD_INPUT
 
 
 def _not_shown(reason: object) -> int:
-    """What there is to show has nowhere to go."""
+    """Print that standard output cannot be written, and return the exit code for that."""
     remark(
         f"standard output cannot be written: {reason}; send it elsewhere, or keep the answer by "
         "--output FILE"
@@ -77,7 +78,7 @@ def run(arguments: list[str] | None = None, command: typer.Typer | None = None) 
     given = sys.argv[1:] or ["--help"] if arguments is None else arguments
     try:
         with remarks(), without_broken_messages():
-            app = command or application(_asked(given))
+            app = command or application(_needed(given))
             return app(given, standalone_mode=False) or ExitCode.SOLVED
     except UsageError as error:
         return _fail(error.format_message())
@@ -85,10 +86,10 @@ def run(arguments: list[str] | None = None, command: typer.Typer | None = None) 
         return _fail(str(error))
     except KeyboardInterrupt:
         return ExitCode.INTERRUPTED
-    except SystemExit:  # of Rich and Click, where whoever read standard output has gone
+    except SystemExit:  # by Rich or Click, where the reader of standard output has closed it
         return _not_shown("nobody reads it")
     except OSError as error:
-        # What goes wrong with a file is a MapError: what names none is the stream's.
+        # A failure with a file is a MapError; an error without a file name is of the stream.
         if error.errno is None or error.filename is not None:
             raise
         return _not_shown(error.strerror)
@@ -96,8 +97,8 @@ def run(arguments: list[str] | None = None, command: typer.Typer | None = None) 
 
 def main() -> None:
     """Entry point of the ``terrapath`` script."""
-    # What is imported stays. To look it all over for garbage as often as a process should that
-    # runs for days, and once more at the end, takes a seventh of the time of a plan on a scene.
+    # Imported objects stay until the end. Python's default garbage collection would examine them
+    # often, and once more at the end. That takes a seventh of the time of a plan on a scene.
     gc.set_threshold(20_000, 20, 100)
     code = run()
     settle(sys.__stdout__, sys.__stderr__)

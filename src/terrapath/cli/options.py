@@ -1,4 +1,4 @@
-"""The command line's options, made of the declarations that scenario files share."""
+"""The command line's options, made from the declarations that scenario files use, too."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..scenario.option import Declared, Extent, Files, Point, Points, Rectangle
-from ..scenario.scenario import options
+from ..scenario.scenario import Given, options
 from ..scenario.sections import LayerTable, LayerTables, Weights
 
 Where = Annotated[
@@ -23,7 +23,7 @@ Where = Annotated[
 
 
 def _numbers(text: str, name: str, form: str, what: str) -> tuple[float, ...]:
-    """As many numbers as the form has, with commas between."""
+    """Numbers with commas between them, as many as the form has."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
         if len(numbers) != form.count(",") + 1:
@@ -35,13 +35,14 @@ def _numbers(text: str, name: str, form: str, what: str) -> tuple[float, ...]:
     return numbers
 
 
-def parse_point(text: str, name: str) -> Any:
-    """X,Y."""
-    return _numbers(text, name, "X,Y", "a point")
+def parse_point(text: str, name: str) -> Point:
+    """A point that is given as X,Y."""
+    x, y = _numbers(text, name, "X,Y", "a point")
+    return x, y
 
 
 def _parse_pairs(texts: Iterable[str], option: str, form: str) -> dict[str, str]:
-    """NAME=VALUE, each name once."""
+    """The values of NAME=VALUE by their names, which must differ."""
     pairs: dict[str, str] = {}
     for text in texts:
         name, separator, value = (part.strip() for part in text.partition("="))
@@ -91,8 +92,8 @@ def _is_flag(declaration: Declared) -> bool:
     return declaration.type in (bool, bool | None)
 
 
-def _typed_by(declaration: Declared) -> Any:
-    """The type that typer reads on the command line; what it cannot read stays text."""
+def _typed_by(declaration: Declared) -> object:
+    """The type that typer reads from the command line; what it cannot read stays text."""
     several = (Points, Point | Points, Files, LayerTables, Weights)
     if declaration.type in several:
         return list[str] | None
@@ -102,11 +103,11 @@ def _typed_by(declaration: Declared) -> Any:
     return str | None
 
 
-def _value(declaration: Declared, given: Any) -> Any:
-    """What was given on the command line as a scenario file's value."""
+def _value(declaration: Declared, given: object) -> object:
+    """The value in a scenario file that means the same as ``given`` on the command line."""
     kind, flag, form = declaration.type, declaration.flags[0], declaration.option.form or ""
     name = declaration.key
-    readers: list[tuple[Any, Callable[[Any], Any]]] = [
+    readers: list[tuple[object, Callable[[Any], object]]] = [
         (Point | None, lambda text: parse_point(text, name)),
         (Points, lambda texts: tuple(parse_point(text, name) for text in texts)),
         (Point | Points, lambda texts: tuple(parse_point(text, name) for text in texts)),
@@ -126,17 +127,17 @@ def _value(declaration: Declared, given: Any) -> Any:
 def _parameter(declaration: Declared) -> inspect.Parameter:
     option = declaration.option
     metavar = None if _is_flag(declaration) else option.form
-    spoken = typer.Option(*declaration.flags, metavar=metavar, help=option.help, show_default=False)
+    shown = typer.Option(*declaration.flags, metavar=metavar, help=option.help, show_default=False)
     return inspect.Parameter(
         declaration.parameter,
         inspect.Parameter.KEYWORD_ONLY,
         default=None,
-        annotation=Annotated[_typed_by(declaration), spoken],
+        annotation=Annotated[_typed_by(declaration), shown],
     )
 
 
 def _taken(sections: Iterable[str], also: Iterable[str], without: Iterable[str]) -> list[Declared]:
-    """The options of the sections that the command line has, and some by their parameter names."""
+    """The command-line options of these sections, plus and minus some by their parameter names."""
     named, left_out = set(also), set(without)
     return [
         declaration
@@ -150,17 +151,17 @@ def _taken(sections: Iterable[str], also: Iterable[str], without: Iterable[str])
 def with_options(
     *sections: str, also: Iterable[str] = (), without: Iterable[str] = ()
 ) -> Callable[[Callable[..., int]], Callable[..., int]]:
-    """A command that takes the options of these sections, for typer to see.
+    """Give a command the options of these sections, so that typer reads them.
 
-    The command is called with ``given``, what stood on the command line, by section and key.
-    also, without : further and unwanted options by their parameter names, as planner_spacing.
+    The command is called with ``given``: the values from the command line, by section and key.
+    also, without : options to add and to leave out, by parameter names such as planner_spacing.
     """
     taken = _taken(sections, also, without)
 
     def decorate(command: Callable[..., int]) -> Callable[..., int]:
-        def read(**values: Any) -> int:
-            found = [(declaration, values.pop(declaration.parameter)) for declaration in taken]
-            return command(given=_by_section(found), **values)
+        def read(**values: object) -> int:
+            shared = [(declaration, values.pop(declaration.parameter)) for declaration in taken]
+            return command(given=_by_section(shared), **values)
 
         own = inspect.signature(command, eval_str=True).parameters.values()
         kept = [p.replace(kind=p.KEYWORD_ONLY) for p in own if p.name != "given"]
@@ -173,9 +174,9 @@ def with_options(
     return decorate
 
 
-def _by_section(found: Iterable[tuple[Declared, Any]]) -> dict[str, dict[str, Any]]:
-    given: dict[str, dict[str, Any]] = {}
-    for declaration, value in found:
+def _by_section(values: Iterable[tuple[Declared, object]]) -> Given:
+    given: dict[str, dict[str, object]] = {}
+    for declaration, value in values:
         if value is not None and value != []:
             given.setdefault(declaration.section, {})[declaration.key] = _value(declaration, value)
     return given

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
-from ..scenario.scenario import assembled
-from .console import ExitCode, compiling_told, progress_bar
+from ..scenario.scenario import Given, assembled
+from .console import ExitCode, compiling_announced, progress_bar
 from .options import Where, with_options
 
 if TYPE_CHECKING:
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 @with_options("map", "route", "constraints", "planner", "output")
-def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
+def plan_command(where: Where, given: Given) -> int:
     """Plan one route on a surface, and prove how far from the shortest it can be.
 
-    All options may stand in a scenario file, see `terrapath init`; those given here count
-    before the file's. Exit codes: 0 solved, 2 bad input, 3 no path found within the limits,
+    All options can also be given in a scenario file, see `terrapath init`; options given here
+    override the file. Exit codes: 0 solved, 2 bad input, 3 no path found within the limits,
     4 proven unreachable, 5 standard output is closed or full (all files are written), 130
     interrupted (the best route to the goal so far is written).
     """
@@ -28,30 +28,30 @@ def plan_command(where: Where, given: dict[str, dict[str, Any]]) -> int:
 
     scenario = assembled(where, given)
     quiet = scenario.output.quiet or scenario.output.json
-    with compiling_told(quiet), progress_bar(quiet) as watch:
-        found = answer(scenario, watch=watch)
-    # Shown before it is written, so that a full disk loses no answer; and written although it
-    # cannot be shown.
+    with compiling_announced(quiet), progress_bar(quiet) as watch:
+        answered = answer(scenario, watch=watch)
+    # The answer is printed first, so that a full disk does not lose it. Files are written even
+    # if it cannot be printed.
     try:
-        _print(found)
+        _print(answered)
     finally:
-        found.write()
-    return exit_code(found.solution)
+        answered.write()
+    return exit_code(answered.solution)
 
 
-def _print(found: Answer) -> None:
-    if found.scenario.output.json:
+def _print(answered: Answer) -> None:
+    if answered.scenario.output.json:
         from ..io.routes.record import dump
 
-        typer.echo(dump(found.record()), nl=False)
+        typer.echo(dump(answered.record()), nl=False)
         return
     from .report import print_report
 
-    print_report(found.solution, found.scenario.planner.target_gap, found.goals)
+    print_report(answered.solution, answered.scenario.planner.target_gap, answered.goals)
 
 
 def exit_code(solution: Solution) -> ExitCode:
-    """The documented exit code for a solution."""
+    """The exit code for a solution."""
     from ..problem import Status
 
     return {

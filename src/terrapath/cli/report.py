@@ -1,4 +1,4 @@
-"""The result table of ``terrapath plan``."""
+"""The tables that ``terrapath plan``, ``check`` and ``field`` print."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from ..distance.field import DistanceField
     from ..planners import GoalAnswer
 
-# Of the routes that a planner found besides the best, so many are shown.
+# At most this many of a planner's alternative routes are shown.
 MOST_ALTERNATIVES = 5
 
 
 def _amount(value: float, unit: str) -> str:
-    """A number with its unit; millimetres on maps, micro-units on small scenes."""
+    """A number with its unit: three digits after the point from 1,000 on, six below."""
     digits = ",.3f" if abs(value) >= 1000.0 else ".6f"
     return f"{value:{digits}} {unit}".rstrip()
 
 
 def _gap(gap: float, target: float | None) -> str:
-    """The gap, and how it stands to the target where there is one."""
+    """The gap, and whether it meets the target where there is one."""
     if target is None:
         return percent(gap)
     met = "is met" if gap <= target else "is not met"
@@ -37,7 +37,7 @@ def _gap(gap: float, target: float | None) -> str:
 
 
 def _longer(length: float, than: float, unit: str) -> str:
-    """A length, and how much more it is than the path's."""
+    """A length, and how much longer it is than the path."""
     more = length / than - 1.0 if than > 0.0 else 0.0
     return f"{_amount(length, unit)} ({percent(more) + ' longer' if more > 1e-9 else 'as long'})"
 
@@ -57,7 +57,7 @@ def _counter_line(solution: Solution) -> str:
 
 
 def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, str]]:
-    """The path's length, what it is worth, and what it is compared with."""
+    """The path's length, its lower bound and gap, and lengths to compare it with."""
     problem, path, length = solution.problem, solution.path, solution.length
     if path is None or length is None:
         return
@@ -107,7 +107,7 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
 
 
 def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
-    """Where alone the fine map was looked at, and what is sure of the rest."""
+    """The part of the map that was planned on at full resolution, and what is proven elsewhere."""
     corridor, unit = solution.corridor, solution.problem.surface.unit
     if corridor is None:
         return
@@ -120,20 +120,20 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     )
     least = corridor.least_length(solution)
     if least is None:
-        yield "elsewhere", "nothing is proven: the map may cost less there"
+        yield "elsewhere", "nothing is proven: a path there may cost less"
     else:
         yield "elsewhere", f"no path on the map is shorter than {_amount(least, unit)}, by chords"
 
 
 def _each(surface: Surface, values: Iterable[float]) -> str:
-    """A number of each layer, with its name and unit."""
+    """A number for each layer, with the layer's name and unit."""
     layers = (*surface.layers, *surface.costs)
     shown = zip(layers, values, strict=False)
     return ", ".join(f"{layer.name} {value:.2g} {layer.unit}".rstrip() for layer, value in shown)
 
 
 def _fit(surface: Surface) -> Iterator[tuple[str, str]]:
-    """How the surface was made of what was given, and how far it is from that."""
+    """How the surface was fitted to the input, and how far it is from it."""
     fit = surface.fit
     unit = surface.layers[0].unit if len(surface.layers) == 1 else "in the layers' units"
     exact = fit.value_error == 0.0
@@ -151,24 +151,24 @@ def _weight(layer: Layer, unit: str) -> str:
     """What a change of the layer costs, in words."""
     one = f"1 {layer.unit}" if layer.unit else "1"
     if layer.weight == 0.0:
-        return "counts for nothing: its weight is 0"
-    return f"a change of {one} counts as {layer.weight:g}{' ' + unit if unit else ''} of way"
+        return "does not count: its weight is 0"
+    return f"a change of {one} counts as {layer.weight:g}{' ' + unit if unit else ''} of travel"
 
 
 def _exponent(layer: Layer) -> str:
-    """What the level of a cost does, in words."""
+    """What the value of a cost layer does, in words."""
     power = "" if layer.weight == 1.0 else f" to the power of {layer.weight:g}"
-    return f"its level{power} multiplies the length"
+    return f"its value{power} multiplies the length"
 
 
 def _contributions(path: Path) -> Iterator[tuple[str, str]]:
-    """What share of the length each layer makes."""
+    """The share of the length that each layer causes."""
     parts = (f"{percent(share)} {name}" for name, share in path.contributions.items())
     yield "length made of", ", ".join(parts)
 
 
 def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
-    """What the route has to mind besides the edge of the map."""
+    """What limits the route besides the edge of the map."""
     problem, unit = solution.problem, solution.problem.surface.unit
     if problem.obstacles:
         yield "obstacles", f"{len(problem.obstacles):,}"
@@ -176,7 +176,7 @@ def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
         yield "vehicle radius", _amount(problem.radius, unit) + ", kept from everything blocked"
     if problem.max_slope is not None:
         yield "steepest ground", f"{problem.max_slope:g} degrees"
-    # In a corridor the area is the corridor's, which is told already.
+    # In a corridor this area is the corridor, which is in the table already.
     if problem.keep_in is not None and solution.corridor is None:
         import shapely
 
@@ -193,12 +193,12 @@ def _print_table(rows: Iterable[tuple[str, str]]) -> None:
     table.add_column(style="bold")
     table.add_column()
     for name, value in rows:
-        table.add_row(name, Text(value))  # not markup: units stand in square brackets
+        table.add_row(name, Text(value))  # not markup: square brackets are around units
     Console(highlight=False).print(table)
 
 
 def _print_parts(heading: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
-    """A table of legs or goals, a line each."""
+    """A table of legs or goals, one line for each."""
     from rich.console import Console
     from rich.table import Table
 
@@ -243,7 +243,7 @@ def _print_goals(goals: Iterable[GoalAnswer], surface: Surface) -> None:
         )
         for k, answer in enumerate(goals, start=1)
     ]
-    _print_parts("Goals", ("goal", "to", "status", "length", "no way is shorter than"), rows)
+    _print_parts("Goals", ("goal", "to", "status", "length", "lower bound"), rows)
 
 
 def _place(point: tuple[float, float]) -> str:
@@ -255,7 +255,7 @@ def print_report(
 ) -> None:
     """Print the tables on standard output, and what went wrong on standard error.
 
-    target_gap : the gap that was asked for, if any. goals : where there are several.
+    target_gap : None where none was given. goals : where there are several.
     """
     _print_table(_rows(solution, target_gap))
     if solution.legs:
@@ -274,7 +274,7 @@ def print_check(problem: Problem, certificate: Certificate, seconds: float) -> N
             ("certificate", "holds"),
             ("start", _point(problem, problem.start)),
             ("goal", _point(problem, problem.goal)),
-            ("proven bound", _amount(certificate.value, unit) + "; no path is shorter"),
+            ("lower bound", _amount(certificate.value, unit) + "; no path is shorter"),
             ("dual norm", f"at most {certificate.norm:.9g}"),
             ("cells", f"{lattice.nx - 1:,} x {lattice.ny - 1:,}"),
             ("seconds", f"{seconds:.3f}"),
@@ -285,7 +285,7 @@ def print_check(problem: Problem, certificate: Certificate, seconds: float) -> N
 def print_field(field: DistanceField, seconds: float) -> None:
     """What a distance field covers."""
     problem, lattice = field.problem, field.lattice
-    assert problem is not None  # as of all that commands make
+    assert problem is not None  # the command computes fields of problems only
     unit = problem.surface.unit
     reached = field.values[np.isfinite(field.values)]
     _print_table(

@@ -27,14 +27,14 @@ def reproduce_command(
         Path, typer.Option(metavar="DIR", help="Directory for pictures, trials and report.")
     ] = Path("reproduction"),
     workers: Annotated[
-        int | None, typer.Option(metavar="N", help="Processes [default: one a core].")
+        int | None, typer.Option(metavar="N", help="Processes [default: one for each core].")
     ] = None,
     seed: Annotated[int, typer.Option(metavar="K", help="Seed of the first trial.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
 ) -> int:
     """Reproduce the figures and tables of the paper's section 5.
 
-    A run that was stopped goes on where it was when the same command is given again.
+    A run that was stopped continues when the same command is given again.
     Exit codes: 0 done, 2 bad input, 130 interrupted (the finished trials are kept).
     """
 

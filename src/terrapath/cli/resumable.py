@@ -1,4 +1,4 @@
-"""Experiments whose finished trials are kept, so that a run that was stopped can go on."""
+"""Experiments whose finished trials are kept, so that a run that was stopped can continue."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .console import ExitCode, bar_for_each, remark
 
 
 def run_resumable(work: Callable[[Watch], Path], output: Path, quiet: bool) -> int:
-    """Run what writes a report, and print where it is; after Ctrl-C, how to go on."""
+    """Run work that writes a report. Print where the report is; after Ctrl-C, how to continue."""
     try:
         with bar_for_each(quiet) as watch:
             report = work(watch)
     except KeyboardInterrupt:
         remark(
             f"interrupted; the finished trials are kept in {output / 'trials'}, and the same "
-            "command goes on from there"
+            "command continues from there"
         )
         return ExitCode.INTERRUPTED
     typer.echo(report)

@@ -15,7 +15,7 @@ def warmup_command(
 ) -> int:
     """Compile all kernels now, so that no later run has to wait for them.
 
-    They are kept on disk; NUMBA_CACHE_DIR says where. Exit codes: 0 done, 2 they cannot be
+    They are kept on disk, in NUMBA_CACHE_DIR if it is set. Exit codes: 0 done, 2 they cannot be
     compiled or kept, 130 interrupted (what was compiled is kept).
     """
     from ..planners.warmup import warm_up
@@ -25,7 +25,7 @@ def warmup_command(
         warmth = warm_up(watch)
     if quiet:
         return ExitCode.SOLVED
-    what = "all kernels are there"
+    what = "all kernels are compiled already"
     if warmth.compiled:
         seconds = time.perf_counter() - started
         what = f"compiled {warmth.compiled} kernels in {seconds:.0f} s"

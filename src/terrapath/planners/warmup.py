@@ -1,4 +1,4 @@
-"""Compiling beforehand: small problems that use every kernel, on both classes of surface."""
+"""Warm-up: small problems that use, and so compile, every kernel on both classes of surface."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ..surface import Mask, Surface
 from ..surface.metric import chord, line_r
 from .registry import plan
 
-# What was compiled for which kernels; it lies beside them.
+# The list of the files of a complete cache, beside them: a later warm-up only checks these files.
 LIST_FILE = "terrapath-warm.json"
 
 SIDE = 12.0  # map units
@@ -37,7 +37,7 @@ START, GOAL = (1.0, 1.0), (11.0, 10.0)
 
 
 class Rehearsal(NamedTuple):
-    """Work that has some kernels compiled."""
+    """Small work that compiles some kernels."""
 
     name: str
     run: Callable[[], object]
@@ -53,12 +53,12 @@ class Warmth(NamedTuple):
 
 
 def peaks() -> Surface:
-    """Of the exact class: a hill, and a second layer."""
+    """A surface of exact peaks: a hill, and a second layer."""
     return Surface.from_peaks([[(2.0, 0.3, 5.0, 6.0)], [(1.0, 0.5, 8.0, 3.0)]])
 
 
 def spline() -> Surface:
-    """Of the class that everything else is of, with costs."""
+    """A spline surface, as maps are, with a cost layer."""
     axis = np.linspace(0.0, SIDE, 25)
     x, y = np.meshgrid(axis, axis)
     hill = np.exp(-0.1 * ((x - 5.0) ** 2 + (y - 6.0) ** 2))
@@ -66,7 +66,7 @@ def spline() -> Surface:
     return Surface.from_grid(values, axis, axis, kinds=["rise", "cost"])
 
 
-# By the name of the class.
+# By the name of the surface's class.
 SURFACES: dict[str, Callable[[], Surface]] = {"peaks": peaks, "spline": spline}
 
 
@@ -118,7 +118,7 @@ def _find_routes(surface: Surface) -> None:
     alternatives(_with_obstacles(surface), count=2)
 
 
-# The longest first.
+# The work that takes longest comes first.
 KINDS: dict[str, Callable[[Surface], None]] = {
     "lower bounds": _prove,
     "trees": _grow,
@@ -131,7 +131,7 @@ KINDS: dict[str, Callable[[Surface], None]] = {
 
 
 def rehearsals() -> list[Rehearsal]:
-    """All that `plan`, `field`, `check` and `reproduce` compile."""
+    """Rehearsals of all kernels that `plan`, `field`, `check` and `reproduce` compile."""
     return [
         Rehearsal(rehearsal_name(kind, name), partial(_rehearse, work, surface))
         for name, surface in SURFACES.items()
@@ -145,7 +145,7 @@ def _rehearse(work: Callable[[Surface], None], surface: Callable[[], Surface]) -
 
 
 def _listed(directory: Path) -> list[str] | None:
-    """Files of these very kernels, if every one is still there and sound."""
+    """The listed files, if they are of the present kernels, and all of them exist undamaged."""
     try:
         record = json.loads((directory / LIST_FILE).read_text(encoding="utf-8"))
         names: list[str] = record["files"]
@@ -169,7 +169,7 @@ def _warmth(directory: Path, names: list[str], compiled: int) -> Warmth:
 
 
 def warm_up(watch: Watch = watch_nothing) -> Warmth:
-    """Compile what is not in the cache yet, or damaged.
+    """Compile the kernels that are missing or damaged in the cache.
 
     Raises InputError where kernels are not compiled at all, MapError where the cache cannot be
     written.
@@ -181,7 +181,7 @@ def warm_up(watch: Watch = watch_nothing) -> Warmth:
     if names is not None:
         return _warmth(directory, names, 0)
     before = cache.kept_files()
-    with told_to(lambda warning: None):  # that kernels cannot be kept is the error below
+    with told_to(lambda warning: None):  # the error below says the same
         _rehearse_all(rehearsals(), watch)
     if (failure := cache.unkept()) is not None:
         raise MapError(failure)
@@ -191,7 +191,7 @@ def warm_up(watch: Watch = watch_nothing) -> Warmth:
 
 
 def _rehearse_all(work: list[Rehearsal], watch: Watch) -> None:
-    """The second half on a second core; here, it finds those kernels or compiles them."""
+    """Run all rehearsals. The second half also runs on a second core, so here it mostly loads."""
     half = len(work) // 2
     with SecondCore(*[rehearsal.name for rehearsal in work[half:]]) as second:
         for done, rehearsal in enumerate(work):
@@ -203,7 +203,7 @@ def _rehearse_all(work: list[Rehearsal], watch: Watch) -> None:
 
 
 def rehearse(names: list[str]) -> None:
-    """What the second process does."""
+    """Run rehearsals by their names, as the second process does."""
     serve_first_core()
     for rehearsal in rehearsals():
         if rehearsal.name in names:

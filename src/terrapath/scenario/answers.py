@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError, TerrapathWarning, collecting
 from ..planners.base import PROVING, Callback, Progress
 from .option import Point
-from .question import Itinerary, Question, asked
+from .question import Itinerary, Question, open_question
 from .scenario import Scenario
 
 if TYPE_CHECKING:
@@ -24,16 +24,17 @@ if TYPE_CHECKING:
     from ..problem import Problem, Solution
     from .outputs import RouteOutputs
 
-# A map with more cells than that is planned on in a corridor, coarse to fine.
+# On a map with more cells than this, a coarse route is planned first, then a fine one in a
+# corridor around it.
 MOST_CELLS = 16_000_000
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Answer:
-    """What a scenario's question was answered by.
+    """The answer to a scenario's question.
 
-    solution : the route, to the nearest of several goals. goals : what is known of each, where
-    there are several. warnings : what went wrong on the way and was no error, in order.
+    solution : the route, to the nearest of several goals. goals : what is known of each goal,
+    where there are several. warnings : the warnings that were given meanwhile, in order.
     """
 
     scenario: Scenario
@@ -45,22 +46,22 @@ class Answer:
         """The answer ready for JSON: what ``terrapath plan --json`` prints."""
         from ..io import route_record
 
-        found = route_record(self.solution)
+        record = route_record(self.solution)
         if self.goals:
-            found["goals"] = [_goal_record(goal) for goal in self.goals]
-        return found
+            record["goals"] = [_goal_record(goal) for goal in self.goals]
+        return record
 
     def write(self) -> None:
-        """Write the files that the scenario names, each whole or not at all; none without a path.
+        """Write the files that the scenario names, each completely or not at all.
 
-        Raises MapError, naming the file and the remedy.
+        Without a path nothing is written. Raises MapError, which names the file and the remedy.
         """
         outputs = _outputs(self.scenario)
         if outputs is not None and self.solution.path is not None:
             outputs.write(self.solution)
 
 
-def _goal_record(answer: GoalAnswer) -> dict[str, Any]:
+def _goal_record(answer: GoalAnswer) -> dict[str, object]:
     """What is known of one goal, ready for JSON."""
     solution = answer.solution
     path = None if solution is None else solution.path
@@ -74,24 +75,24 @@ def _goal_record(answer: GoalAnswer) -> dict[str, Any]:
 
 
 def goal_status(answer: GoalAnswer) -> str:
-    """How the planning to a goal ended; ``farther`` needed no planning to know it."""
+    """How planning to a goal ended. ``farther`` : it is not the nearest; no planning was needed."""
     return "farther" if answer.solution is None else answer.solution.status.value
 
 
 def answer(scenario: Scenario, *, watch: Callback | None = None) -> Answer:
     """Answer a scenario's question, as ``terrapath plan`` does.
 
-    Maps with too many cells are planned on in a corridor, unless the scenario says otherwise.
-    Files that the scenario names are looked at before anything is planned; ``Answer.write``
-    writes them. watch : sees the progress of each stage, and stops the planner by returning True.
-    Raises TerrapathError, naming the value and the remedy.
+    On maps with too many cells it plans in a corridor, unless the scenario says otherwise. It
+    checks before planning that the scenario's files can be written; ``Answer.write`` writes them.
+    watch : gets the progress of each stage, and stops the planner by returning True.
+    Raises TerrapathError, which names the value and the remedy.
     """
     _require_agreement(scenario)
     planner = _planner(scenario)
     outputs = _outputs(scenario)
     if outputs is not None:
         outputs.check(scenario.inputs())
-    with collecting() as warnings, asked(scenario) as question:
+    with collecting() as warnings, open_question(scenario) as question:
         cells = question.cells()
         run = _Run(planner, question, outputs, watch)
         solution, goals = (
@@ -104,35 +105,35 @@ def field(scenario: Scenario) -> DistanceField:
     """The distance field from the scenario's start, as ``terrapath field`` computes it."""
     from ..distance.field import field_of
 
-    with asked(scenario) as question:
+    with open_question(scenario) as question:
         problem = question.problem_to_itself()
     return field_of(problem, spacing=scenario.planner.spacing)
 
 
 def check(scenario: Scenario, certificate: Certificate, *, leg: int | None = None) -> Problem:
-    """Prove a certificate again, as ``terrapath check`` does; returns the problem it is of.
+    """Prove a certificate again, as ``terrapath check`` does; returns the certificate's problem.
 
-    leg : of a tour, from 1, the one that is proven. Raises CertificateError where it does not
-    hold, and InputError where the scenario does not say which leg or goal is meant.
+    leg : the number of the tour's leg that is proven, from 1. Raises CertificateError where the
+    certificate does not hold, and InputError where the leg or the goal is not clear.
     """
-    with asked(scenario) as question:
+    with open_question(scenario) as question:
         problem = _leg(question.itinerary(), leg)
     certificate.check(problem)
     return problem
 
 
-def _leg(asked_for: Itinerary, number: int | None) -> Problem:
-    """The leg that a certificate is of."""
-    if len(asked_for.goals) > 1:
+def _leg(itinerary: Itinerary, number: int | None) -> Problem:
+    """The leg that a certificate belongs to."""
+    if len(itinerary.goals) > 1:
         raise InputError(
-            f"a certificate is of one goal, and {len(asked_for.goals)} are given; name it by "
+            f"a certificate belongs to one goal, and {len(itinerary.goals)} are given; name it by "
             "--goal X,Y"
         )
-    problem = asked_for.problem
-    stops = [problem.start, *asked_for.via, problem.goal]
+    problem = itinerary.problem
+    stops = [problem.start, *itinerary.via, problem.goal]
     count = len(stops) - 1
     if number is None and count > 1:
-        raise InputError(f"the tour has {count} legs; say by --leg K which one is proven")
+        raise InputError(f"the tour has {count} legs; give the leg that is proven by --leg K")
     if number is not None and not 1 <= number <= count:
         raise InputError(f"--leg {number}: the tour has {count} legs; give 1 to {count}")
     k = number or 1
@@ -155,7 +156,7 @@ def _require_agreement(scenario: Scenario) -> None:
         ("--certificate", output.certificate),
     ):
         if value is not None and not planner.bound:
-            raise InputError(f"{option} asks for a bound and --no-bound for none; leave out one")
+            raise InputError(f"{option} needs a lower bound; leave out either it or --no-bound")
     if scenario.route.all_goals and len(scenario.route.goals) < 2:
         raise InputError("--all-goals reports several goals; give --goal more than once")
 
@@ -183,20 +184,21 @@ def _outputs(scenario: Scenario) -> RouteOutputs | None:
 
 
 def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
-    """Is the map too large to be planned on as a whole? InputError for what needs it whole.
+    """Is the map too large to plan on the whole of it?
 
-    cells : of the map that is asked about.
+    cells : their number in the part of the map that is planned on. Raises InputError for options
+    that need the whole map.
     """
     if scenario.planner.corridor == "none" or cells <= MOST_CELLS:
         return False
-    for what, is_asked in (
+    for what, is_given in (
         ("several goals", len(scenario.route.goals) > 1),
         ("--certificate", scenario.output.certificate is not None),
     ):
-        if is_asked:
+        if is_given:
             raise InputError(
-                f"the map has {cells:,} cells, so it is planned on in a corridor, and {what} needs "
-                "it whole; leave that out, shrink --bounds, or give --corridor none"
+                f"the map has {cells:,} cells, so the route is planned in a corridor, and {what} "
+                "needs the whole map; leave that out, shrink --bounds, or give --corridor none"
             )
     return True
 
@@ -206,7 +208,7 @@ def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
 
 @dataclass(frozen=True)
 class _Run:
-    """A planner at a question."""
+    """A planner that answers a question."""
 
     planner: Finished
     question: Question
@@ -214,7 +216,7 @@ class _Run:
     watch: Callback | None
 
     def whole(self) -> tuple[Solution, tuple[GoalAnswer, ...]]:
-        """Plan on all of the map: one route, or one to each goal that may be the nearest."""
+        """Plan on the whole map: one route, or one to each goal that may be the nearest."""
         itinerary = self._itinerary()
         problem, via, goals = itinerary.problem, itinerary.via, itinerary.goals
         with self._watched(problem) as watch:
@@ -225,11 +227,11 @@ class _Run:
             if len(goals) == 1:
                 return plan_tour(problem, self.planner, via, callback=watch), ()
             every = self.question.scenario.route.all_goals
-            found = plan_goals(problem, self.planner, goals, via, every=every, callback=watch)
-        return nearest(found), found
+            answers = plan_goals(problem, self.planner, goals, via, every=every, callback=watch)
+        return nearest(answers), answers
 
     def in_corridor(self, cells: int) -> tuple[Solution, tuple[GoalAnswer, ...]]:
-        """Plan on the map read coarser, and on the map itself around the route found there."""
+        """Plan on a coarser copy of the map, then on the map itself around the coarse route."""
         from ..planners.corridor import plan_in_corridor
 
         def pose(part: Part) -> tuple[Problem, Sequence[Point]]:
@@ -252,9 +254,9 @@ class _Run:
 
     @contextmanager
     def _watched(self, problem: Problem | None) -> Iterator[Callback | None]:
-        """The watcher, told the unit of what it sees; and kernels compiled on a second core.
+        """The watcher, with the unit of lengths; meanwhile a second core may compile kernels.
 
-        problem : None where it is made later, of a part of a map.
+        problem : None where it is made later, from a part of a map.
         """
         surface = None if problem is None else problem.surface
         unit = "" if surface is None else surface.unit
@@ -270,7 +272,7 @@ class _Run:
 
 
 def _waiting(second: SecondCore, watch: Callback | None) -> Callback:
-    """A watcher that waits for the second core when the lower bound is begun."""
+    """A watcher that waits for the second core when the search for the lower bound begins."""
 
     def see(progress: Progress) -> bool:
         if progress.stage == PROVING:

@@ -1,26 +1,33 @@
-"""Values checked by pydantic against what the sections declare, and what is wrong in words."""
+"""Values checked by pydantic against the declarations of the sections, and mistakes in words."""
 
 from __future__ import annotations
 
 import difflib
 import functools
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 from .option import Declared, declared
 from .scenario import SECTIONS, Scenario, options
 from .sections import LayerTable
 
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+    from pydantic.json_schema import JsonSchemaValue
+    from pydantic_core import ErrorDetails
+    from pydantic_core.core_schema import NullableSchema, WithDefaultSchema
+
+# Longer values are cut in messages, characters.
 MOST_SHOWN = 60
 
-# What pydantic calls a key that no section has.
+# Pydantic's error type for a key that no section has.
 UNKNOWN = "unexpected_keyword_argument"
 
 
 class WrongValueError(Exception):
     """A value, or a key, that a scenario cannot have.
 
-    keys : where it stands: the section, the key, and so on. reason : what is wrong, in words.
+    keys : where it is: the section, the key, and so on. reason : what is wrong, in words.
     """
 
     def __init__(self, keys: tuple[str, ...], reason: str) -> None:
@@ -29,7 +36,7 @@ class WrongValueError(Exception):
 
 
 @functools.cache
-def _adapter() -> Any:
+def _adapter() -> TypeAdapter[Scenario]:
     from pydantic import TypeAdapter
 
     return TypeAdapter(Scenario)
@@ -40,12 +47,12 @@ def scenario_schema() -> dict[str, Any]:
     from pydantic.json_schema import GenerateJsonSchema
 
     class Schema(GenerateJsonSchema):
-        """TOML has no null: what is not given is left out."""
+        """A schema without null, which TOML does not have: a key may be left out instead."""
 
-        def nullable_schema(self, schema: Any) -> Any:
+        def nullable_schema(self, schema: NullableSchema) -> JsonSchemaValue:
             return self.generate_inner(schema["schema"])
 
-        def default_schema(self, schema: Any) -> Any:
+        def default_schema(self, schema: WithDefaultSchema) -> JsonSchemaValue:
             if schema.get("default", ()) in (None, ()):
                 return self.generate_inner(schema["schema"])
             return super().default_schema(schema)
@@ -55,20 +62,19 @@ def scenario_schema() -> dict[str, Any]:
 
 
 def validated(data: dict[str, Any]) -> Scenario:
-    """The scenario of a table of sections. Raises WrongValueError for the first mistake."""
+    """The scenario with these values, by section and key. Raises WrongValueError for a mistake."""
     from pydantic import ValidationError
 
     try:
-        scenario: Scenario = _adapter().validate_python(data)
+        return _adapter().validate_python(data)
     except ValidationError as error:
-        # A misspelt key is why another is missing.
-        found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != UNKNOWN)
-        raise WrongValueError(*_explained(found[0], data)) from None
-    return scenario
+        # Unknown keys first: where a key is misspelt, the right one is missing, too.
+        errors = sorted(error.errors(include_url=False), key=lambda one: one["type"] != UNKNOWN)
+        raise WrongValueError(*_explained(errors[0], data)) from None
 
 
-def _explained(error: Mapping[str, Any], data: dict[str, Any]) -> tuple[tuple[str, ...], str]:
-    """Where in the file an error of pydantic's is, and what it is."""
+def _explained(error: ErrorDetails, data: dict[str, Any]) -> tuple[tuple[str, ...], str]:
+    """The keys at which one of pydantic's errors is, and what is wrong there, in words."""
     keys = _keys_of(error["loc"], data)
     if error["type"] == UNKNOWN:
         return keys, _unknown(keys)
@@ -80,11 +86,11 @@ def _explained(error: Mapping[str, Any], data: dict[str, Any]) -> tuple[tuple[st
     return keys, f"{_named(keys)} is {shown}, but {_expected(keys)} is expected"
 
 
-def _keys_of(location: Iterable[Any], data: Any) -> tuple[str, ...]:
-    """The part of a location that is made of the file's keys; the rest is pydantic's own."""
+def _keys_of(location: Iterable[int | str], data: object) -> tuple[str, ...]:
+    """The part of a location that consists of keys of the file; pydantic adds more to it."""
     keys: list[str] = []
     for part in location:
-        if not (isinstance(data, dict) and part in data):
+        if not (isinstance(part, str) and isinstance(data, dict) and part in data):
             break
         keys.append(part)
         data = data[part]
@@ -125,7 +131,7 @@ def _nearest(key: str, known: list[str]) -> str:
 
 
 def nearest_keyword(keyword: str) -> str:
-    """What may have been meant by an unknown keyword of Python's, in words."""
+    """What an unknown keyword argument may have been meant to be, in words."""
     words = {word: entry.keyword for entry in options() for word in _words(entry)}
     near = difflib.get_close_matches(keyword, words, n=1)
     if near:
@@ -134,7 +140,7 @@ def nearest_keyword(keyword: str) -> str:
 
 
 def _nearest_option(key: str, section: str) -> str:
-    """Of the section, else of another; options are also known by their name as a flag."""
+    """The nearest option of the section, else of another. The names of flags count, too."""
     for within in ([section], SECTIONS):
         words = {word: entry for entry in options(*within) for word in _words(entry)}
         near = difflib.get_close_matches(key, words, n=1)

@@ -1,14 +1,19 @@
-"""One option: its name, type and default, and what is said of it."""
+"""One option: its name, type and default, and its description."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, TypeAlias, get_type_hints
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_type_hints
+
+if TYPE_CHECKING:
+    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+    from pydantic.json_schema import JsonSchemaValue
+    from pydantic_core import CoreSchema
 
 # How pydantic reads a section: unknown keys are errors, and so are NaN and infinity.
-STRICT: dict[str, Any] = {"extra": "forbid", "allow_inf_nan": False}
+STRICT: dict[str, str | bool] = {"extra": "forbid", "allow_inf_nan": False}
 
 Point: TypeAlias = tuple[float, float]
 Points: TypeAlias = tuple[Point, ...]
@@ -24,11 +29,12 @@ A_POINT = "two finite numbers, [X, Y]"
 
 @dataclass(frozen=True)
 class Option:
-    """What is said of an option beside its name, type and default.
+    """The description of an option; its name, type and default are declared beside it.
 
-    expects : what a scenario file has to give, in words. form : what stands for the value on
-    the command line. flags : there, where they are not made of the key. example : as TOML,
-    for an option without a default. is_file : the text names a file.
+    expects : the kind of value that a scenario file must give, in words. form : the value's
+    placeholder on the command line. flags : on the command line, where they do not follow from
+    the key. example : a value in TOML, for an option without a default. is_file : the text names
+    a file.
     """
 
     help: str
@@ -38,17 +44,21 @@ class Option:
     example: str = ""
     is_file: bool = False
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
         schema = handler(source)
         _forbid_conversion(schema)
         return schema
 
-    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> Any:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
         return handler(schema) | {"description": self.help}
 
 
-def _forbid_conversion(schema: Any) -> None:
-    """No number from text, no whole number from a fraction, no number from true."""
+def _forbid_conversion(schema: object) -> None:
+    """Accept no text or true as a number, and no fraction as a whole number."""
     if isinstance(schema, dict):
         if schema.get("type") in {"float", "int", "bool", "str"}:
             schema["strict"] = True
@@ -95,18 +105,18 @@ class Declared(NamedTuple):
 
     section: str
     key: str
-    type: Any
-    default: Any
+    type: object
+    default: object
     option: Option
 
     @property
     def parameter(self) -> str:
-        """Its name among the arguments of a command."""
+        """Its name as an argument of a command's function."""
         return f"{self.section}_{self.key}"
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """Its names on the command line; none where the command names it in another place."""
+        """Its names on the command line; none for the map, which is the argument WHERE."""
         if self.key in {"path", "scene"}:
             return ()
         return self.option.flags or (f"--{self.key.replace('_', '-')}",)
@@ -118,7 +128,7 @@ class Declared(NamedTuple):
 
 
 @functools.cache
-def declared(section: type) -> tuple[tuple[str, Any, Any, Option], ...]:
+def declared(section: type) -> tuple[tuple[str, object, object, Option], ...]:
     """Key, type, default and option of each field of a section, in order."""
     hints = get_type_hints(section, include_extras=True)
     return tuple(

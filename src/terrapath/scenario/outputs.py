@@ -1,4 +1,4 @@
-"""Files that will be written: whether they can be is found out before anything is planned."""
+"""The files to write. Whether they can be written is checked before anything is planned."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def require_outputs(paths: Sequence[Path], inputs: Iterable[str]) -> None:
-    """Raise MapError where a file cannot be written, is named twice, or holds an input."""
+    """Raise MapError where a file cannot be written, is named twice, or is an input."""
     from .._support.files import require_writable
 
     for path in paths:
@@ -35,28 +35,28 @@ def require_outputs(paths: Sequence[Path], inputs: Iterable[str]) -> None:
 
 
 def _place(path: Path) -> Path:
-    """Where a path leads. Path.resolve would raise where links go in circles."""
+    """The real path. Path.resolve would raise where links form a circle."""
     return Path(os.path.realpath(path))
 
 
 def _places_of(name: str) -> Iterator[Path]:
-    """Where an input may lie, and the folders around it: an output may be a folder."""
+    """The real paths that an input may have, and their folders: an output may be a folder."""
     for file in _files_in(name):
         place = _place(file)
         yield from (place, *place.parents)
 
 
 def _files_in(name: str) -> Iterator[Path]:
-    """What may be the file in an input's name: FILE, FILE:LAYER, DRIVER:"FILE":PART, ..."""
+    """The parts of an input's name that may be its file: FILE:LAYER, DRIVER:"FILE":PART, ..."""
     for text in (name, name.partition(":")[2]):
         before, _, after = text.rpartition(":")
         yield from (Path(part.strip('"')) for part in (text, before, after) if part)
 
 
 def require_ending(path: Path, option: str, ending: str) -> None:
-    """Raise MapError for another ending than the one there is."""
+    """Raise MapError where the path does not have this ending."""
     if path.suffix.lower() != ending:
-        raise MapError(f"{option}={str(path)!r} has no known format; end it in {ending}")
+        raise MapError(f"{option}={str(path)!r} has no known format; the name must end in {ending}")
 
 
 def _path(text: str | None) -> Path | None:
@@ -72,36 +72,36 @@ def numbered(path: Path, count: int) -> list[Path]:
 
 @dataclass(frozen=True)
 class RouteOutputs:
-    """Where the route goes. legs : of the tour that is planned."""
+    """The files of a route. legs : their number in the tour that is planned."""
 
-    asked: OutputSection
+    section: OutputSection
     legs: int = 1
 
     @property
     def files(self) -> list[Path]:
-        """Of the route, in its formats."""
-        return [Path(file) for file in self.asked.files]
+        """The files of the route itself."""
+        return [Path(file) for file in self.section.files]
 
     @property
     def certificates(self) -> list[Path]:
-        """One for each leg."""
-        path = _path(self.asked.certificate)
+        """The files of certificates, one for each leg."""
+        path = _path(self.section.certificate)
         return [] if path is None else numbered(path, self.legs)
 
     def check(self, inputs: Iterable[str]) -> None:
-        """Find out before the planning whether all can be written, and replaces no input."""
+        """Raise MapError beforehand where a file cannot be written or would replace an input."""
         from ..io.routes import require_known_format
 
-        asked = self.asked
+        section = self.section
         for path in self.files:
             require_known_format(path)
-        pictures = [Path(picture) for picture in (asked.plot, asked.profile) if picture is not None]
+        pictures = [Path(name) for name in (section.plot, section.profile) if name is not None]
         if pictures:
             from ..plotting.figure import require_known_picture
 
             for picture in pictures:
                 require_known_picture(picture)
-        pages = [] if asked.page is None else [Path(asked.page)]
+        pages = [] if section.page is None else [Path(section.page)]
         for page in pages:
             from ..plotting.page import require_known_page
 
@@ -118,40 +118,40 @@ class RouteOutputs:
             require_fitting_format(path, problem.surface.georeference)
 
     def write(self, solution: Solution) -> None:
-        """Write every file that there is something to write into."""
+        """Write every file, except certificates where no lower bound was proven."""
         from ..io import write_route
 
-        asked = self.asked
+        section = self.section
         for path in self.files:
             write_route(solution, path)
         for path, leg in zip(self.certificates, solution.legs or [solution], strict=False):
             if leg.certificate is None:
-                tell(UnfinishedWarning(f"{path} was not written: no bound was proven"))
+                tell(UnfinishedWarning(f"{path} was not written: no lower bound was proven"))
             else:
                 leg.certificate.save(path)
-        if asked.plot is not None:
+        if section.plot is not None:
             from ..plotting import plot_route
 
-            plot_route(solution, asked.plot)
-        if asked.profile is not None:
+            plot_route(solution, section.plot)
+        if section.profile is not None:
             from ..plotting import plot_profile
 
-            plot_profile(solution, asked.profile)
-        if asked.page is not None:
+            plot_profile(solution, section.profile)
+        if section.page is not None:
             from ..plotting import plot_page
 
-            plot_page(solution, asked.page)
+            plot_page(solution, section.page)
 
 
 @dataclass(frozen=True)
 class FieldOutputs:
-    """Where the field goes."""
+    """The files of a distance field."""
 
     files: Sequence[Path]
     plot: Path | None
 
     def check(self, inputs: Iterable[str]) -> None:
-        """Find out beforehand whether all can be written, and replaces no input."""
+        """Raise MapError beforehand where a file cannot be written or would replace an input."""
         from ..io.fields import require_known_format
 
         if not self.files and self.plot is None:

@@ -1,4 +1,4 @@
-"""Where and what: the problem that a scenario describes, on all of its map or on a part."""
+"""The problem that a scenario describes, on all of its map or on a part of it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Place(NamedTuple):
-    """The ground that is asked about, and what is known of the route over it."""
+    """The ground that is planned on, and what is known of the route over it."""
 
     surface: Surface
     bounds: Bounds | None
@@ -37,7 +37,7 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Itinerary:
-    """A problem to the first of the goals, the points to pass, and all goals, map units."""
+    """A problem to the first of the goals, the points to pass, and all goals. Map units."""
 
     problem: Problem
     via: tuple[Point, ...]
@@ -45,8 +45,8 @@ class Itinerary:
 
 
 @contextmanager
-def asked(scenario: Scenario) -> Iterator[Question]:
-    """What a scenario asks about, with its map open meanwhile."""
+def open_question(scenario: Scenario) -> Iterator[Question]:
+    """A scenario's question. Its map is open as long as the context lasts."""
     place = scenario.map
     if place.scene is not None:
         yield Question(scenario, None)
@@ -77,7 +77,7 @@ def _sources(tables: dict[str, LayerTable]) -> dict[str, LayerSource]:
 
 
 def require_map(name: str) -> None:
-    """Raise InputError for a name that is neither a scene's nor can be a map's."""
+    """Raise InputError for a name that cannot be a map's, and so was meant to be a scene's."""
     path = Path(name)
     if not path.exists() and not path.suffix and ":" not in name:
         from ..problem.scenes import names
@@ -87,17 +87,17 @@ def require_map(name: str) -> None:
 
 @dataclass(frozen=True)
 class Question:
-    """What a scenario asks about. map : None for a built-in scene."""
+    """A scenario and its open map. map : None for a built-in scene."""
 
     scenario: Scenario
     map: OpenMap | None = field(repr=False)
 
     def cells(self) -> int:
-        """How many cells the map has that is asked about; 0 for a scene."""
+        """How many cells of the map are within the bounds; 0 for a scene."""
         return 0 if self.map is None else self.map.cells(self.scenario.route.bounds)
 
     def itinerary(self, part: Part | None = None) -> Itinerary:
-        """From the start through the waypoints to the goals, on a part of the map."""
+        """The problem from start to goal, the waypoints and the goals, on a part of the map."""
         place = self._place(part)
         route = self.scenario.route
         start = self._end(place, "start", route.start)
@@ -108,7 +108,7 @@ class Question:
         return Itinerary(self._problem(place, start, goals[0], corridor), via, goals)
 
     def problem_to_itself(self) -> Problem:
-        """The problem that is asked about where there is no goal: from the start to the start."""
+        """A problem for a question without a goal: from the start to the start."""
         place = self._place()
         start = self._end(place, "start", self.scenario.route.start)
         return self._problem(place, start, start)
@@ -140,7 +140,7 @@ class Question:
         return [shape for file in files for shape in read_obstacles(file, surface)]
 
     def _area(self, surface: Surface, corridor: Corridor | None) -> BaseGeometry | None:
-        """The ground that may not be left, if there is any such."""
+        """The area that the route may not leave; None where there is no such area."""
         file, area = self.scenario.constraints.keep_in, None
         if file is not None:
             from ..io import read_area
@@ -152,15 +152,15 @@ class Question:
         return around if area is None else around.intersection(area)
 
     def _place(self, part: Part | None = None) -> Place:
-        """The scene or the map, weighted, and the region to plan in."""
+        """The scene or the map with its weights, and the bounds to plan in."""
         weights = self.scenario.map.weights
-        found = self._scene() if self.map is None else self._read(self.map, part)
+        place = self._scene() if self.map is None else self._read(self.map, part)
         if weights:
-            found = found._replace(surface=found.surface.with_weights(weights))
+            place = place._replace(surface=place.surface.with_weights(weights))
         rectangle = self.scenario.route.bounds
         if rectangle is None:
-            return found
-        return found._replace(bounds=region(found.surface, rectangle))
+            return place
+        return place._replace(bounds=region(place.surface, rectangle))
 
     def _scene(self) -> Place:
         from ..problem.scenes import load
@@ -179,7 +179,7 @@ class Question:
         window, decimate = self.scenario.route.bounds, 1
         if part is not None:
             window, decimate = part.within or window, part.decimate
-        # What is blocked beyond the bounds keeps the vehicle off, too.
+        # The vehicle's radius keeps it away from blocked cells outside the bounds, too.
         margin = self.scenario.constraints.radius
         surface = opened.surface(within=window, margin=margin, decimate=decimate)
         return Place(surface, None, Path(self.scenario.map.path or "").stem, {})
@@ -202,7 +202,7 @@ class Question:
 def on_plane(surface: Surface, point: Point, name: str, *, latlon: bool) -> Point:
     """A point of the map, or a latitude and a longitude in degrees, on the plane.
 
-    Raises InputError, which calls the point by its name, where it is off the map.
+    name : of the point, for messages. Raises InputError where the point is off the map.
     """
     return _from_latlon(surface, point, name) if latlon else _from_map(surface, point, name)
 
@@ -247,7 +247,7 @@ def _inside(surface: Surface, place: Point, point: Point, name: str, remedy: str
 
 
 def region(surface: Surface, rectangle: Rectangle) -> Bounds:
-    """A rectangle of the map's own coordinates on the plane; what is off the map is cut off."""
+    """The bounds on the plane of a rectangle in the map's own coordinates, clipped to the map."""
     from ..surface.bounds import Bounds, as_bounds
 
     given, whole, reference = as_bounds(rectangle), surface.bounds, surface.georeference

@@ -6,13 +6,16 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar, TypeAlias
 
 from ..errors import InputError
 from .option import STRICT, Declared, Files, declared
 from .sections import ConstraintsSection, MapSection, OutputSection, PlannerSection, RouteSection
 
-# Of a scenario file, in its order.
+# Values by section and key.
+Given: TypeAlias = Mapping[str, Mapping[str, object]]
+
+# The sections of a scenario file, in its order.
 SECTIONS: Mapping[str, type] = {
     "map": MapSection,
     "route": RouteSection,
@@ -23,7 +26,7 @@ SECTIONS: Mapping[str, type] = {
 
 
 def options(*sections: str) -> Iterator[Declared]:
-    """The options of the sections, of all by default."""
+    """The options of these sections; of all where none is named."""
     for name in sections or SECTIONS:
         for key, kind, default, option in declared(SECTIONS[name]):
             yield Declared(name, key, kind, default, option)
@@ -31,9 +34,9 @@ def options(*sections: str) -> Iterator[Declared]:
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario:
-    """A question to Terrapath: all that ``terrapath plan`` can be told."""
+    """A question to Terrapath: the values of all options of ``terrapath plan``."""
 
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
 
     map: MapSection = field(default_factory=MapSection)
     route: RouteSection = field(default_factory=RouteSection)
@@ -62,8 +65,8 @@ class Scenario:
             if entry.option.is_file and value:
                 yield from [value] if isinstance(value, str) else value
 
-    def overridden(self, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
-        """With the values given, by section and key; tables are merged name by name."""
+    def overridden(self, given: Given) -> Scenario:
+        """The scenario with the given values in place of its own; tables are merged by name."""
         changed = {}
         for name, values in given.items():
             section = getattr(self, name)
@@ -75,16 +78,16 @@ class Scenario:
         return dataclasses.replace(self, **changed)
 
 
-def load(where: str | Path, **given: Any) -> Scenario:
+def load(where: str | Path, **given: object) -> Scenario:
     """A question to Terrapath, ready for ``answer``.
 
     where : a scenario file (``.toml``), a raster, or the name of a built-in scene.
-    given : options over the file's, called as in a scenario file, with ``planner`` for the
-    planner's name and ``output`` for the files of the route: ``start=(0, 0)``,
-    ``planner="optimal"``, ``weights={"height": 10}``, ``max_slope=25``. Paths are seen from the
+    given : options that override the file's. Their names are the keys of a scenario file, but
+    ``planner`` is the planner's name and ``output`` the files of the route: ``start=(0, 0)``,
+    ``planner="optimal"``, ``weights={"height": 10}``, ``max_slope=25``. Paths are relative to the
     working directory.
-    Raises InputError for an option that is not known, with the nearest one that is, and for a
-    value of the wrong kind; ScenarioError with the line of a scenario file.
+    Raises InputError for an unknown option, with the nearest known one, and for a value of the
+    wrong kind; ScenarioError with the line of a scenario file.
     """
     if not isinstance(where, str | Path):
         raise InputError(
@@ -94,15 +97,15 @@ def load(where: str | Path, **given: Any) -> Scenario:
     return assembled(str(where), _checked(given))
 
 
-def assembled(where: str, given: Mapping[str, Mapping[str, Any]]) -> Scenario:
-    """A scenario file's values, or those of a map or a scene, and over them the given ones.
+def assembled(where: str, given: Given) -> Scenario:
+    """The scenario of a scenario file, a map or a scene, with the given values instead of its own.
 
     given : checked values by section and key. Raises InputError for a name no file can have.
     """
-    asked = _at(where).overridden(given)
-    for file in asked.files():
+    scenario = _at(where).overridden(given)
+    for file in scenario.files():
         _require_name(Path(file))
-    return asked
+    return scenario
 
 
 def _require_name(path: Path) -> None:
@@ -120,7 +123,7 @@ def _at(where: str) -> Scenario:
         from .toml import read_scenario
 
         return read_scenario(where)
-    if not ending:  # as no scene has
+    if not ending:  # names of scenes have none
         from ..problem.scenes import SCENES
 
         if where in SCENES:
@@ -128,30 +131,30 @@ def _at(where: str) -> Scenario:
     return Scenario(map=MapSection(path=where))
 
 
-def _checked(given: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Keywords of Python as checked values by section and key."""
+def _checked(given: Mapping[str, object]) -> Given:
+    """Keyword arguments as checked values by section and key."""
     from .checked import WrongValueError, nearest_keyword, validated
 
     known = {entry.keyword: entry for entry in options()}
-    asked: dict[str, dict[str, Any]] = {}
+    values: dict[str, dict[str, object]] = {}
     for keyword, value in given.items():
         if keyword not in known:
             raise InputError(f"there is no option {keyword!r}; {nearest_keyword(keyword)}")
         entry = known[keyword]
         several = entry.type == Files and isinstance(value, str | Path)
-        asked.setdefault(entry.section, {})[entry.key] = _plain([value] if several else value)
+        values.setdefault(entry.section, {})[entry.key] = _plain([value] if several else value)
     try:
-        checked = validated(asked)
+        checked = validated(values)
     except WrongValueError as mistake:
         raise InputError(mistake.reason) from None
     return {
-        section: {key: getattr(getattr(checked, section), key) for key in values}
-        for section, values in asked.items()
+        section: {key: getattr(getattr(checked, section), key) for key in keys}
+        for section, keys in values.items()
     }
 
 
-def _plain(value: Any) -> Any:
-    """Paths as text, arrays and their numbers as Python's own."""
+def _plain(value: object) -> object:
+    """A value with paths as text, and arrays and their numbers as Python's own types."""
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, Mapping):

@@ -1,8 +1,8 @@
 """The options of ``terrapath plan`` and of scenario files, each declared once.
 
-The command line, scenario files, their JSON Schema, ``tp.scenario.load`` and what ``terrapath
-init`` writes are made of these declarations. Nothing heavy is imported here: typer reads them to
-print the help, and pydantic comes only with values to check.
+The command line, scenario files, their JSON Schema, ``tp.scenario.load`` and the template of
+``terrapath init`` are all made from these declarations. Nothing slow is imported here, because
+typer reads them to print the help; pydantic is imported when there are values to check.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from .option import (
 class LayerTable:
     """A band of a raster as a layer."""
 
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
 
     file: Annotated[str, a_file("The raster.", '"layer.tif"')]
     band: Annotated[int, Option("Its band, 1-based.", WHOLE)] = 1
     weight: Annotated[
         float,
         Option(
-            "Of a layer: the map units that a change of one unit of it counts as. Of a cost: the "
-            "exponent of the multiplier.",
+            "Of a layer: the map units of travel that a change of one unit counts as. Of a cost: "
+            "the exponent of the multiplier.",
             NUMBER,
         ),
     ] = 1.0
@@ -58,16 +58,16 @@ A_LAYER = "a table with file, band and weight"
 class MapSection:
     """The ground: a raster with its layers, or a built-in scene."""
 
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
 
-    path: Annotated[str | None, a_file("A raster, anything GDAL reads.", '"dem.tif"')] = None
+    path: Annotated[str | None, a_file("A raster that GDAL can read.", '"dem.tif"')] = None
     scene: Annotated[
         str | None, Option("A built-in scene, see `terrapath scenes`.", TEXT, example='"six-peaks"')
     ] = None
     height_band: Annotated[
         int | str | None,
         Option(
-            "Band of the heights, its number or the name of a variable [default: 1].",
+            "Band of the heights: its number, or the name of a variable [default: 1].",
             "a whole number, or the name of a variable as text",
             form="BAND",
             example="1",
@@ -76,15 +76,15 @@ class MapSection:
     fill_holes: Annotated[
         float,
         a_number(
-            "Fill holes without data whose longer side is at most this, map units; larger ones "
-            "stay blocked [default: 0, none].",
+            "Fill holes without data whose longer side is at most this long, map units; larger "
+            "holes stay blocked [default: 0, none].",
             "SIZE",
         ),
     ] = 0.0
     smooth: Annotated[
         Extent,
         Option(
-            "Smooth over this length (standard deviation, map units); auto is the least that "
+            "Smooth over this length (standard deviation, map units); auto takes the least that "
             "heights rounded to a step need [default], none leaves the map as it is.",
             'a finite number, "auto" or "none"',
             form="LENGTH|auto|none",
@@ -92,12 +92,12 @@ class MapSection:
     ] = "auto"
     crs: Annotated[
         str | None,
-        Option("CRS of a map that names none, as EPSG:32617.", TEXT, "CRS", (), '"EPSG:32617"'),
+        Option("CRS of a map that has none, as EPSG:32617.", TEXT, "CRS", (), '"EPSG:32617"'),
     ] = None
     layers: Annotated[
         LayerTables,
         Option(
-            "A further layer, whose change costs; may be repeated.",
+            "A further layer, whose changes cost as those of the height do; may be repeated.",
             A_LAYER,
             form="NAME=FILE[:BAND][*WEIGHT]",
             flags=("--layer",),
@@ -106,7 +106,7 @@ class MapSection:
     costs: Annotated[
         LayerTables,
         Option(
-            "A multiplier above 0 of the length, whose level costs; may be repeated.",
+            "A cost layer, whose value, above 0, multiplies the length; may be repeated.",
             A_LAYER,
             form="NAME=FILE[:BAND][*EXPONENT]",
             flags=("--cost",),
@@ -115,8 +115,8 @@ class MapSection:
     weights: Annotated[
         Weights,
         Option(
-            "Map units that a change of one unit of a layer counts as, the height's too; may be "
-            "repeated.",
+            "Map units of travel that a change of one unit of a layer counts as; height is a "
+            "layer, too; may be repeated.",
             "a table of numbers, NAME = WEIGHT",
             form="NAME=WEIGHT",
             flags=("--weight",),
@@ -126,9 +126,9 @@ class MapSection:
 
 @dataclass(frozen=True, kw_only=True)
 class RouteSection:
-    """From where to where."""
+    """Start, goals and the points between them."""
 
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
 
     start: Annotated[
         Point | None,
@@ -137,7 +137,7 @@ class RouteSection:
     goal: Annotated[
         Point | Points,
         Option(
-            "Goal, in the map's own coordinates; of several the nearest by true length wins.",
+            "Goal, in the map's own coordinates; of several, the nearest by true length is chosen.",
             "a point, [X, Y], or a list of points",
             form="X,Y",
             example="[10.0, 10.0]",
@@ -146,8 +146,8 @@ class RouteSection:
     all_goals: Annotated[
         bool,
         a_switch(
-            "Plan to each of several goals and report all, or only as far as is needed to know "
-            "the nearest [default].",
+            "Plan to each of several goals and report all, or plan only as far as is needed to "
+            "know the nearest [default].",
             "--all-goals/--nearest-goal",
         ),
     ] = False
@@ -190,7 +190,7 @@ class RouteSection:
 class ConstraintsSection:
     """Where the route may not go."""
 
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
 
     obstacles: Annotated[
         Files,
@@ -201,7 +201,8 @@ class ConstraintsSection:
     radius: Annotated[
         float,
         a_number(
-            "Of the vehicle: the least distance to every obstacle, map units [default: 0].", "R"
+            "Radius of the vehicle: the least distance to every obstacle, map units [default: 0].",
+            "R",
         ),
     ] = 0.0
     max_slope: Annotated[
@@ -210,15 +211,17 @@ class ConstraintsSection:
     ] = None
     keep_in: Annotated[
         str | None,
-        a_file("A vector file of the area that may not be left, in any CRS.", '"area.geojson"'),
+        a_file(
+            "A vector file of the area that the route may not leave, in any CRS.", '"area.geojson"'
+        ),
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlannerSection:
-    """How the route is looked for, and what is proven of it."""
+    """How the route is planned, and what is proven about it."""
 
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
 
     name: Annotated[
         str,
@@ -233,19 +236,22 @@ class PlannerSection:
     refine: Annotated[
         bool,
         a_switch(
-            "Take the planner's path to the locally shortest one [default], or not.",
+            "Refine the planner's path to the locally shortest one near it [default], or not.",
             "--refine/--no-refine",
         ),
     ] = True
     bound: Annotated[
         bool,
-        a_switch("Prove how short any path can be [default], or not.", "--bound/--no-bound"),
+        a_switch(
+            "Prove a lower bound on the length of every path [default], or not.",
+            "--bound/--no-bound",
+        ),
     ] = True
     target_gap: Annotated[
         float | None,
         a_number(
-            "Refine the bound until (length - bound) / bound is G "
-            "[default: 0.001 with optimal, else the first bound will do].",
+            "Raise the lower bound until the gap, (length - bound) / bound, is at most G "
+            "[default: 0.001 with optimal, else the first bound is kept].",
             "G",
             "0.01",
         ),
@@ -264,21 +270,27 @@ class PlannerSection:
     spacing: Annotated[
         float | None,
         a_number(
-            "Of the nodes of dijkstra, a-star, fast-marching, optimal and `terrapath field`, map "
-            "units [default: a 250th of the region's longer side, or a cell of a finer map].",
+            "Distance between nodes of dijkstra, a-star, fast-marching, optimal and `terrapath "
+            "field`, map units [default: a 250th of the region's longer side, or a cell of a "
+            "finer map].",
             "D",
             "0.05",
         ),
     ] = None
     neighbours: Annotated[
-        int | None, a_count("Of a node of dijkstra and a-star: 8, 16 or 32 [default: 16].", "16")
+        int | None,
+        a_count("Neighbours of a node of dijkstra and a-star: 8, 16 or 32 [default: 16].", "16"),
     ] = None
     directions: Annotated[
         int | None, a_count("Rays of geodesic-traversal [default: 600].", "600")
     ] = None
     radius_factor: Annotated[
         float | None,
-        a_number("Times the least near radius of the theory [default: 1.5].", "F", "1.5"),
+        a_number(
+            "The near radius, as a multiple of the least that theory asks for [default: 1.5].",
+            "F",
+            "1.5",
+        ),
     ] = None
     goal_bias: Annotated[
         float | None, a_number("Share of samples that are the goal [default: 0.05].", "P", "0.05")
@@ -293,25 +305,29 @@ class PlannerSection:
     ] = None
     time_limit: Annotated[
         float | None,
-        a_number("Stop then, with the best so far; legs and goals share it.", "SECONDS", "60.0"),
+        a_number(
+            "Stop after this time with the best path so far; legs and goals share it.",
+            "SECONDS",
+            "60.0",
+        ),
     ] = None
     corridor: Annotated[
         Extent,
         Option(
-            "Maps of over 16 million cells are planned on coarse to fine: then around the coarse "
-            "route alone, within this distance, map units; auto is 40 coarse cells [default], none "
-            "plans on all of the map at once.",
+            "On maps of over 16 million cells, plan a coarse route, and then the route within this "
+            "distance of it, map units; auto is 40 coarse cells [default], none plans on the whole "
+            "map at once.",
             'a finite number, "auto" or "none"',
             form="WIDTH|auto|none",
         ),
     ] = "auto"
     target_length: Annotated[
-        float | None, a_number("Stop at a path this short, map units.", "LENGTH", "17.2")
+        float | None, a_number("Stop at a path at most this long, map units.", "LENGTH", "17.2")
     ] = None
 
     @property
     def own(self) -> dict[str, Any]:
-        """The options of the planner itself that were given."""
+        """The given options that belong to the planner itself."""
         general = {"name", "refine", "bound", "target_gap", "corridor"}
         given = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return {k: v for k, v in given.items() if k not in general and v is not None}
@@ -319,14 +335,14 @@ class PlannerSection:
 
 @dataclass(frozen=True, kw_only=True)
 class OutputSection:
-    """Where the answer goes."""
+    """What is printed and written."""
 
-    __pydantic_config__: ClassVar[dict[str, Any]] = STRICT
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
 
     files: Annotated[
         Files,
         some_files(
-            "Write the route, in the format of the ending; may be repeated.",
+            "Write the route; the file's ending chooses the format; may be repeated.",
             '["route.geojson"]',
             "--output",
         ),
@@ -352,8 +368,8 @@ class OutputSection:
     certificate: Annotated[
         str | None,
         a_file(
-            "Write the proof of the bound, .npz, for `terrapath check`; of several legs "
-            "numbered files.",
+            "Write the proof of the lower bound, .npz, for `terrapath check`; a tour has one "
+            "numbered file for each leg.",
             '"proof.npz"',
         ),
     ] = None

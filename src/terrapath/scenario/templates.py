@@ -9,7 +9,7 @@ import re
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,16 +19,16 @@ from ..problem import Problem
 from ..problem.scenes import SCENES, load
 from ..surface import Surface
 from .answers import MOST_CELLS
-from .option import Declared, declared
+from .option import Declared, Point, declared
 from .question import require_map
 from .scenario import SECTIONS, options
 from .sections import LayerTable
 
 # Words that name heights in the description of a band.
 HEIGHT_WORDS = ("height", "elevation", "altitude", "dem", "dtm", "dsm", "topograph")
-# What is made of heights and named after them.
+# Words that name what is computed from heights, and is not height.
 DERIVED_WORDS = ("slope", "aspect", "rough", "shade", "curvature", "error", "count")
-# Guessed ends lie on a grid of so many places a side, from corner to corner.
+# Start and goal are guessed among a grid of places; this many lie along each side of the map.
 PLACES = 9
 WIDTH = 88
 
@@ -50,9 +50,9 @@ class Band(NamedTuple):
 def template(where: str, file: str | Path = "scenario.toml", *, crs: str | None = None) -> str:
     """The text of a scenario to begin with: every key with its help, and a route.
 
-    where : a built-in scene, a raster, or what GDAL reads under that name. file : where the text
-    will stand, for paths are seen from there. crs : of a raster that names none. Start and goal
-    on a raster are guessed: free places far from one another that a path connects.
+    where : a built-in scene, a raster, or another name that GDAL can read. file : the file that
+    the text is for; paths in it are relative to its folder. crs : of a raster that has none.
+    Start and goal on a raster are guessed: free places far apart that a path connects.
     Raises MapError where the raster cannot be read, or has no two such places.
     """
     if where in SCENES:
@@ -73,18 +73,18 @@ def _of_map(where: str, file: Path, crs: str | None) -> str:
     bands = _bands(where)
     height = _height_band(bands)
     with open_map(where, height_band=height, crs=crs) as opened:
-        # On a large map ends are guessed on means of its cells.
+        # On a large map, start and goal are guessed on a coarser copy.
         surface = opened.surface(decimate=factor(opened.cells(), MOST_CELLS))
     path = Path(where)
-    seen = Path(os.path.relpath(path, file.parent)).as_posix() if path.exists() else where
+    name = Path(os.path.relpath(path, file.parent)).as_posix() if path.exists() else where
     values = {
-        ("map", "path"): _text(seen),
+        ("map", "path"): _text(name),
         ("map", "height_band"): str(height),
         **_ends(surface, _guess(surface)),
     }
     if crs is not None:
         values["map", "crs"] = _text(crs)
-    return _template(values, path.name, _band_lines(bands, height, seen))
+    return _template(values, path.name, _band_lines(bands, height, name))
 
 
 def _bands(where: str) -> list[Band]:
@@ -98,15 +98,15 @@ def _bands(where: str) -> list[Band]:
             described = zip(dataset.descriptions, dataset.units, strict=True)
             return [Band(k, d or "", u or "") for k, (d, u) in enumerate(described, start=1)]
     except (RasterioError, OSError):
-        return []  # read_surface tells what is wrong with it
+        return []  # opening it as a map raises the error
 
 
 def _height_band(bands: list[Band]) -> int:
     """The band that is described as heights, else the first."""
     for band in bands:
-        said = band.description.lower()
-        is_derived = any(word in said for word in DERIVED_WORDS)
-        if not is_derived and any(word in said for word in HEIGHT_WORDS):
+        text = band.description.lower()
+        is_derived = any(word in text for word in DERIVED_WORDS)
+        if not is_derived and any(word in text for word in HEIGHT_WORDS):
             return band.number
     return 1
 
@@ -114,8 +114,8 @@ def _height_band(bands: list[Band]) -> int:
 # Start and goal
 
 
-def _guess(surface: Surface) -> tuple[Any, Any]:
-    """Two free places far from one another that a path connects, plane."""
+def _guess(surface: Surface) -> tuple[Point, Point]:
+    """Two free places far apart that a path connects, on the plane."""
     bounds = surface.bounds
     assert bounds is not None
     along = np.linspace(0.1, 0.9, PLACES)
@@ -131,7 +131,7 @@ def _guess(surface: Surface) -> tuple[Any, Any]:
     raise MapError("no two free places of the map could be found that a path connects")
 
 
-def _is_free(surface: Surface, place: Any) -> bool:
+def _is_free(surface: Surface, place: Point) -> bool:
     try:
         Problem(surface, place, place)
     except (InputError, OutsideSurfaceError):
@@ -140,23 +140,25 @@ def _is_free(surface: Surface, place: Any) -> bool:
 
 
 def _digits(surface: Surface) -> int:
-    """Decimals of the map's own coordinates that tell a hundredth of a cell."""
+    """The decimals that a hundredth of a cell needs in the map's own coordinates."""
     reference = surface.georeference
     in_degrees = reference is not None and reference.map_crs.is_geographic
     cell = surface.resolution / (111_000.0 if in_degrees else 1.0)
     return max(0, int(np.ceil(-np.log10(cell))) + 2)
 
 
-def _rounded(surface: Surface, place: Any) -> Any:
-    """The place on the plane that the scenario's rounded coordinates will name."""
+def _rounded(surface: Surface, place: Point) -> Point:
+    """The place on the plane that the scenario's rounded coordinates stand for."""
     reference = surface.georeference
     if reference is None or reference.is_map_crs:
-        return tuple(np.round(place, _digits(surface)).tolist())
+        x, y = np.round(place, _digits(surface)).tolist()
+        return x, y
     rounded = np.round(reference.to_map(np.array(place)), _digits(surface))
-    return tuple(reference.from_map(rounded).tolist())
+    x, y = reference.from_map(rounded).tolist()
+    return x, y
 
 
-def _ends(surface: Surface, ends: tuple[Any, Any]) -> dict[tuple[str, str], str]:
+def _ends(surface: Surface, ends: tuple[Point, Point]) -> dict[tuple[str, str], str]:
     """Start and goal as TOML, in the map's own coordinates."""
     reference = surface.georeference
     points = np.array(ends, np.float64)
@@ -170,16 +172,16 @@ def _ends(surface: Surface, ends: tuple[Any, Any]) -> dict[tuple[str, str], str]
 
 
 def _text(value: str) -> str:
-    """TOML's basic strings are JSON's, but for one character."""
+    """A string in TOML. It is written as in JSON, except for one character."""
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _template(values: Values, what: str, bands: list[str]) -> str:
     lines = [
         f"# Scenario: a route over {what}.",
-        "# Every option of `terrapath plan` stands here. What stands behind # is not given: take",
-        "# away the # to give it. Lengths are in map units.",
-        "# Paths are seen from the folder of this file. Options on the command line count first.",
+        "# This file has every option of `terrapath plan`. An option behind # is not given: remove",
+        "# the # to give it. Lengths are in map units. Paths are relative to the folder of this",
+        "# file. Options on the command line override those in this file.",
     ]
     for section, kind in SECTIONS.items():
         lines += ["", "", f"# {kind.__doc__}", f"[{section}]"]
@@ -211,7 +213,7 @@ def _entry(entry: Declared, value: str | None) -> list[str]:
     return [*help_text, f"# {entry.key} = {example}"]
 
 
-def _as_toml(value: Any) -> str:
+def _as_toml(value: object) -> str:
     return json.dumps("" if value is None else value)
 
 

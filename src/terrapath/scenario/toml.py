@@ -1,7 +1,7 @@
 """Scenario files: TOML that holds every option of ``terrapath plan``.
 
-What may stand in one is declared in ``sections``. An error is one line with the file, the line,
-the key, its value and what is expected.
+``sections`` declares what a file may contain. An error is one line with the file, the line, the
+key, its value and what is expected.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from ..errors import InputError
 from .checked import WrongValueError, validated
 from .scenario import Scenario, options
 
-# A scenario is a page or two; what is larger is something else.
+# A scenario is one or two pages long; a file larger than this is something else.
 MOST_BYTES = 1_000_000
-# Prefixes of the text that are read to find the line of an error.
+# At most this many beginnings of the text are read to find the line of an error.
 MOST_ATTEMPTS = 200
 
 
@@ -28,7 +28,7 @@ class ScenarioError(InputError):
 
 
 def read_scenario(path: str | Path) -> Scenario:
-    """The scenario in a TOML file; its paths are taken from the file's folder.
+    """The scenario in a TOML file; paths in it are relative to the file's folder.
 
     Raises ScenarioError with the file, the line, the key, its value and what is expected.
     """
@@ -38,7 +38,7 @@ def read_scenario(path: str | Path) -> Scenario:
         data = tomllib.loads(text)
     except RecursionError:
         raise ScenarioError(f"{file} is nested too deeply to be a scenario") from None
-    except ValueError as error:  # of TOML, and numbers of too many digits
+    except ValueError as error:  # not TOML, or a number with too many digits
         raise ScenarioError(f"{file} is not valid TOML: {error}") from None
     scenario = _validated(data, text, file)
     _require_one_map(scenario, text, file)
@@ -55,7 +55,7 @@ def _read_text(file: Path) -> str:
         reason = getattr(error, "strerror", None) or error
         raise ScenarioError(f"{file} cannot be read: {reason}; check the path") from None
     if len(content) > MOST_BYTES:
-        raise ScenarioError(f"{file} has over {MOST_BYTES:,} bytes; no scenario is so large")
+        raise ScenarioError(f"{file} has over {MOST_BYTES:,} bytes; no scenario is that large")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -89,24 +89,24 @@ def _require_one_map(scenario: Scenario, text: str, file: Path) -> None:
 
 
 def _resolved(scenario: Scenario, folder: Path) -> Scenario:
-    """The scenario with its files seen from where the command runs."""
-    seen: Any
-    changed: dict[str, dict[str, Any]] = {}
+    """The scenario with paths that lead from the working directory to its files."""
+    resolved: object
+    changed: dict[str, dict[str, object]] = {}
     for entry in options():
         value = getattr(getattr(scenario, entry.section), entry.key)
-        see = functools.partial(_joined if entry.section == "output" else _seen_from, folder)
+        resolve = functools.partial(_joined if entry.section == "output" else _input_in, folder)
         if entry.option.is_file and isinstance(value, tuple):
-            seen = tuple(map(see, value))
+            resolved = tuple(map(resolve, value))
         elif entry.option.is_file and value:
-            seen = see(value)
+            resolved = resolve(value)
         elif isinstance(value, dict) and entry.key in {"layers", "costs"}:
-            seen = {
-                name: dataclasses.replace(table, file=see(table.file))
+            resolved = {
+                name: dataclasses.replace(table, file=resolve(table.file))
                 for name, table in value.items()
             }
         else:
             continue
-        changed.setdefault(entry.section, {})[entry.key] = seen
+        changed.setdefault(entry.section, {})[entry.key] = resolved
     return scenario.overridden(changed)
 
 
@@ -114,8 +114,8 @@ def _joined(folder: Path, name: str) -> str:
     return str(folder / name)
 
 
-def _seen_from(folder: Path, name: str) -> str:
-    """FILE or FILE:LAYER. What GDAL opens by another name (NETCDF:..., /vsizip/...) stays."""
+def _input_in(folder: Path, name: str) -> str:
+    """FILE or FILE:LAYER in a folder. Other names for GDAL (NETCDF:..., /vsizip/...) stay."""
     if "://" in name or name.startswith("/vsi"):
         return name
     file, _, layer = name.rpartition(":")
@@ -128,15 +128,15 @@ def _seen_from(folder: Path, name: str) -> str:
 
 
 def _line_of(text: str, keys: tuple[str, ...]) -> int | None:
-    """The line on which the entry of these keys begins; None where it is not found.
+    """The line on which the entry with these keys begins; None where it is not found.
 
-    The text is read up to some line, by tomllib as all of it: an entry stands where reading
-    one more line brings it in.
+    tomllib gives no lines. So the beginning of the text is read, up to one line or another: the
+    entry is on the line that must be added for it to appear. Bisection finds that line.
     """
     lines, attempts = text.split("\n"), MOST_ATTEMPTS
 
-    def read_to(end: int) -> tuple[int, Any]:
-        """The last line up to ``end`` that a statement ends on, and what is in them."""
+    def read_to(end: int) -> tuple[int, object]:
+        """The last line up to ``end`` on which a statement ends, and the data up to there."""
         nonlocal attempts
         for last in range(end, 0, -1):
             attempts -= 1
@@ -148,7 +148,7 @@ def _line_of(text: str, keys: tuple[str, ...]) -> int | None:
                 continue
         return 0, {}
 
-    low, high = 0, len(lines)  # not in the first ``low`` lines; in the first ``high``
+    low, high = 0, len(lines)  # the entry is not in the first ``low`` lines, but in ``high``
     if not keys or not _holds(read_to(high)[1], keys):
         return None
     while high - low > 1:
@@ -174,7 +174,7 @@ def _first_of_statement(lines: list[str], last: int) -> int:
     return last
 
 
-def _holds(data: Any, keys: tuple[str, ...]) -> bool:
+def _holds(data: object, keys: tuple[str, ...]) -> bool:
     for key in keys:
         if not (isinstance(data, dict) and key in data):
             return False

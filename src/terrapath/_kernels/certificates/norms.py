@@ -1,4 +1,8 @@
-"""What is proven of a function u over boxes. The checker uses this, and the solver does not."""
+"""Proofs about a function u, box by box, for lower bounds.
+
+M, the norm, is a number such that u / M grows along a path by no more than the path's length.
+``certificates/claims.py`` says what follows. The checker uses this, and no planner does.
+"""
 
 import math
 from typing import NamedTuple
@@ -35,17 +39,17 @@ class Potential(NamedTuple):
 
 @inner_kernel
 def share_of_cell(share, half):
-    """The share of its cell at which a box has its centre, exact for a box on the cell's side.
+    """The centre of a box as a share of its cell; exact for a box on a side of the cell.
 
-    On a side, one of the four coefficients has the factor 0. With a rounding error it would
-    count, and it can be huge, for no cell may depend on it.
+    There, one of the four coefficients has the factor 0. Rounding would make it count, and it
+    can be huge, because it may belong to no cell.
     """
     return math.floor(share + 0.5) if half == 0.0 else share
 
 
 @inner_kernel
 def potential_over(potential, i, j, box):
-    """Models of u and its slopes over a box inside cell (i, j), or on a side of it."""
+    """Taylor models of u and its slopes over a box inside cell (i, j), or on a side of it."""
     return spline_models(
         potential.coefficients,
         i,
@@ -66,7 +70,7 @@ class Facts(NamedTuple):
     """What is proven of one box."""
 
     norm: float  # at least the square of the dual norm of du anywhere in the box
-    sample: float  # its largest value at nine points, but for the remainders
+    sample: float  # its largest value at nine points, without the models' remainders
     lowest: float  # at most u anywhere in the box
     chord: float  # at most the chord from anywhere in the box to the goal, times the least cost
 
@@ -97,7 +101,7 @@ def planar_distance(box, goal):
 
 @kernel
 def facts_of_box(surface, potential, goal, i, j, box, work):
-    """Bounds over a box inside cell (i, j) and one piece of the surface.
+    """What is proven of a box inside cell (i, j) and inside one piece of the surface.
 
     With slopes g_k of the weighted layers, h = c^2 H, H = I + sum g_k g_k^T and
 
@@ -140,39 +144,39 @@ def facts_of_box(surface, potential, goal, i, j, box, work):
 
 
 class Need(NamedTuple):
-    """An M that is enough for a box, and what nine points of it need."""
+    """The M that a box needs. An M is enough for a box where no path through it can refute it."""
 
-    proven: float
-    likely: float
+    proven: float  # this is enough
+    likely: float  # this is enough at nine points
     slope: float  # the dual norm at those points
 
 
 @inner_kernel
 def need_of_box(facts, horizon):
-    """The least M for which a box proves nothing wrong.
+    """The least M that is enough for a box.
 
-    Either the dual norm is at most M everywhere in it, or u / M and the chord to the goal
-    add up to horizon / M anywhere in it, so that no path through it is shorter.
+    Either the dual norm of du is at most M everywhere in the box. Or everywhere in it, u / M and
+    the chord to the goal add up to at least horizon / M, so that no path through it is shorter.
     """
-    # Of what overflowed, and so may be no number, nothing is proven.
+    # Where something overflowed, and may be NaN, nothing is proven.
     slope = math.sqrt(max(facts.norm, 0.0)) if facts.norm < math.inf else math.inf
     likely = math.sqrt(max(facts.sample, 0.0)) if facts.sample < math.inf else math.inf
     short = horizon - facts.lowest
-    way_out = math.inf
+    by_chord = math.inf
     if short <= 0.0:
-        way_out = 0.0
+        by_chord = 0.0
     elif short < math.inf and 0.0 < facts.chord < math.inf:
-        way_out = short / facts.chord
-    return Need(min(slope, way_out), min(likely, way_out), likely)
+        by_chord = short / facts.chord
+    return Need(min(slope, by_chord), min(likely, by_chord), likely)
 
 
 class Cutting(NamedTuple):
-    """Room for the pieces of a cell."""
+    """Workspace for the pieces of a cell."""
 
     x: np.ndarray
     y: np.ndarray
     work: np.ndarray  # (2 layers, 11)
-    boxes: np.ndarray  # (3 DEPTH + 1, 5): centre, half widths and depth of boxes that wait
+    boxes: np.ndarray  # (3 DEPTH + 1, 5): centre, half widths, depth of boxes still to do
 
 
 @inner_kernel
@@ -204,7 +208,7 @@ def cut_cell(surface, potential, i, j, cutting):
 
 @kernel
 def need_of_cell(surface, potential, goal, horizon, i, j, cutting):
-    """The least M of cell (i, j), by the models over its whole pieces."""
+    """The M that cell (i, j) needs, by models over its pieces, which are not cut further."""
     pieces = cut_cell(surface, potential, i, j, cutting)
     proven, likely, slope = 0.0, 0.0, 0.0
     for q in range(pieces.rows):
@@ -217,16 +221,14 @@ def need_of_cell(surface, potential, goal, horizon, i, j, cutting):
     return Need(proven, likely, slope)
 
 
-# A box is cut in four where M could be lower for it by this share, and so often at most.
+# A box is cut in four where that could lower M by this share, and at most this often.
 WORTHWHILE = 2e-5
-
-
 DEPTH = 6
 
 
 @kernel
 def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, cutting):
-    """The least M, ``norm`` or above, that is enough for a box; it is cut up where that helps."""
+    """The least M, at least ``norm``, that is enough for a box; it is cut where that helps."""
     boxes = cutting.boxes
     boxes[0, 0], boxes[0, 1], boxes[0, 2], boxes[0, 3], boxes[0, 4] = (
         box.x,
@@ -257,7 +259,7 @@ def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, cutting):
 
 @kernel
 def cheap_need(floor, potential, goal, horizon, i, j):
-    """An M that is enough for cell (i, j), from u's coefficients and the planar distance alone."""
+    """An M that is enough for cell (i, j), from u's coefficients and planar distance alone."""
     lowest = math.inf
     for q in range(4):
         for k in range(4):
@@ -279,7 +281,7 @@ def cheap_need(floor, potential, goal, horizon, i, j):
 def fill_needs(surface, potential, goal, horizon, exempt, enough, cutting, proven, likely, slope):
     """A rough M that is enough for each cell (ny, nx); 0 where exempt.
 
-    ``enough`` : where an M as low as this is proven, no lower one is looked for.
+    enough : where this M is proven to be enough, no lower one is looked for.
     """
     for j in range(proven.shape[0]):
         for i in range(proven.shape[1]):
@@ -296,10 +298,10 @@ def fill_needs(surface, potential, goal, horizon, exempt, enough, cutting, prove
 
 @kernel
 def least_norm(surface, potential, goal, horizon, order, needs, norm, cutting):
-    """The least M, ``norm`` or above, that is enough for all cells.
+    """The least M, at least ``norm``, that is enough for all cells.
 
-    needs (ny, nx) : what is proven to be enough. order : numbers of the cells, by falling
-    need, so that the cells that decide M come first.
+    needs (ny, nx) : an M that is proven to be enough for each cell. order : numbers of the cells,
+    the largest need first, so that the cells that decide M come first.
     """
     columns = needs.shape[1]
     for n in order:
@@ -316,14 +318,14 @@ def least_norm(surface, potential, goal, horizon, order, needs, norm, cutting):
     return norm
 
 
-# The margin on a core's edge
+# The margin on the edge of a core, a block of cells around an end of all paths
 
 
 class Anchor(NamedTuple):
-    """An end of all paths, and how far it is from a point p nearby at least.
+    """The start or the goal, and how far a nearby point p is from it at least.
 
-    That is the lesser of ``floor`` times the chord and ``far``: as long as a path stays around
-    the anchor no cost is below the floor, and when it leaves it is ``far`` long already.
+    That is the lesser of ``floor`` times the chord and ``far``: near the anchor no cost is below
+    the floor, and a path that leaves this neighbourhood is already ``far`` long.
     """
 
     lifted: np.ndarray  # (2 + layers,)
@@ -356,7 +358,7 @@ def margin_of_box(surface, potential, anchor, factor, i, j, box):
             rise = value.c00 - end[2 + k]
             total = plus(total, times_number(offset, floor * rise / chord))
     margin = min(total.c00 - spread(total), outside_margin)
-    # No number, where something overflowed.
+    # NaN where something overflowed.
     return margin if margin > -math.inf else -math.inf
 
 

@@ -29,7 +29,7 @@ class Box(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """Models of a layer's value and of its slopes, all times its weight."""
+    """Taylor models of a layer's value and of its slopes, all times its weight."""
 
     value: Model
     slope_x: Model
@@ -56,7 +56,7 @@ class SeriesPair(NamedTuple):
 
 @inner_kernel
 def gaussian(falloff, offset, a):
-    """Series of exp(-falloff t^2) around t = offset over half width a."""
+    """Series of exp(-falloff t^2) and its derivative around t = offset, over half width a."""
     c0 = math.exp(-falloff * offset * offset)
     c1 = -2.0 * falloff * offset * c0
     c2 = -falloff * (offset * c1 + c0)
@@ -94,7 +94,7 @@ def peaks_layer(surface, layer, box):
 
 @inner_kernel
 def bump(k, t, w):
-    """Series of the k-th of the four cubic B-splines of a knot span, t + w p in [0, 1]."""
+    """Series in p of the k-th cubic B-spline of a knot span, at t + w p in [0, 1]; k < 4."""
     if k == 0:
         r = 1.0 - t
         return Series(r * r * r / 6.0, -0.5 * r * r * w, 0.5 * r * w * w, -w * w * w / 6.0, 0.0)
@@ -120,13 +120,13 @@ def bump(k, t, w):
 
 @inner_kernel
 def bump_slope(k, t, dx):
-    """The slope of a B-spline at a point, as a series over no width."""
+    """The slope of a B-spline at a point, as a constant series."""
     return Series(bump(k, t, 1.0).c1 / dx, 0.0, 0.0, 0.0, 0.0)
 
 
 @inner_kernel
 def point_slope(coefficients, i, row, t, dx):
-    """The slope along a row of coefficients at a point, as a series over no width."""
+    """The slope along a row of coefficients at a point, as a constant series."""
     total = 0.0
     for k in range(4):
         total += coefficients[row, i + k] * bump_slope(k, t, dx).c0
@@ -135,13 +135,14 @@ def point_slope(coefficients, i, row, t, dx):
 
 @kernel
 def spline_models(coefficients, i, j, t, s, w, v, dx, dy):
-    """Value and slopes of a bicubic spline inside one of its cells.
+    """Models of value and slopes of a bicubic spline over a box inside one of its cells.
 
-    coefficients (ny + 2, nx + 2); the box is centred at (t, s) in the cell, half widths
+    coefficients (ny + 2, nx + 2). The box has its centre at (t, s) in the cell and half widths
     (w, v), all as shares of the cell, which is dx by dy.
     """
     zero = constant(0.0)
-    # What all coefficients share adds to the value alone, and no digit of a slope cancels.
+    # One value is subtracted from all coefficients, so that no digits of a slope cancel. It is
+    # added to the value alone.
     base = coefficients[j + 1, i + 1]
     total = Layer(constant(base), zero, zero)
     for q in range(4):
@@ -182,7 +183,7 @@ def cell_of(x, x0, dx, cells):
 
 @kernel
 def spline_over(surface, coefficients, box):
-    """Models of a spline on the surface's knots over a box, and of its slopes."""
+    """Models over a box of a spline on the surface's knots, and of its slopes."""
     i = cell_of(box.x, surface.x0, surface.dx, coefficients.shape[1] - 3)
     j = cell_of(box.y, surface.y0, surface.dy, coefficients.shape[0] - 3)
     return spline_models(
@@ -251,7 +252,7 @@ def spline_cuts(surface, axis, low, high, cuts):
         knot = origin + k * step
         if knot >= high:
             break
-        # A knot within rounding of the end before would leave a piece of no width.
+        # A knot that differs from the last cut by rounding alone would make a piece of no width.
         if knot > cuts[pieces] + 1e-9 * step and knot < high - 1e-9 * step:
             pieces += 1
             cuts[pieces] = knot

@@ -1,10 +1,10 @@
 """Taylor models: polynomials on a box, with a proven limit on their error.
 
-A Taylor model of a function on a box is a polynomial of degree 3 in coordinates (p, q) that
+A Taylor model of a function on a box is a polynomial of degree 3 in coordinates (p, q), which
 run over [-1, 1]^2, and a remainder r: nowhere in the box do the function and the polynomial
 differ by more. Sums and products of models are models, so terms that cancel do so exactly.
-For a dual norm that is 1 up to a small smooth error, the model proves 1 up to that error,
-whatever the slopes (Makino and Berz 2003). The checker uses this, and the solver does not.
+Where a dual norm is 1 but for a small smooth error, the model proves that, however steep the
+slopes are (Makino and Berz 2003). The checker uses this, and no planner does.
 """
 
 import math
@@ -75,7 +75,7 @@ def minus(f, g):
 
 @inner_kernel
 def degree1(f):
-    """Sum of the sizes of the terms of degree 1."""
+    """Sum of the absolute values of the coefficients of degree 1."""
     return abs(f.c10) + abs(f.c01)
 
 
@@ -91,13 +91,13 @@ def degree3(f):
 
 @inner_kernel
 def spread(f):
-    """How far f can be from its value at the centre."""
+    """How far f can be from the constant term of its polynomial."""
     return degree1(f) + degree2(f) + degree3(f) + f.r
 
 
 @inner_kernel
 def times(f, g):
-    """The product: what goes beyond degree 3 adds to the remainder."""
+    """The product; terms beyond degree 3 are added to the remainder."""
     f1, f2, f3, g1, g2, g3 = degree1(f), degree2(f), degree3(f), degree1(g), degree2(g), degree3(g)
     beyond = f1 * g3 + f2 * g2 + f3 * g1 + f2 * g3 + f3 * g2 + f3 * g3
     size_f, size_g = abs(f.c00) + f1 + f2 + f3, abs(g.c00) + g1 + g2 + g3
@@ -172,7 +172,7 @@ def kept(work, row):
 
 
 class Series(NamedTuple):
-    """c0 + c1 p + c2 p^2 + c3 p^3, give or take r."""
+    """c0 + c1 p + c2 p^2 + c3 p^3, plus or minus at most r."""
 
     c0: float
     c1: float

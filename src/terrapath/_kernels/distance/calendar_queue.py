@@ -1,4 +1,4 @@
-"""The queue of fast marching: nodes that have a trial value, the least first."""
+"""The queue of fast marching: nodes that have a trial value, the one with the least first."""
 
 import math
 from typing import NamedTuple
@@ -11,23 +11,24 @@ from ..compiler import inner_kernel, kernel
 class Front(NamedTuple):
     """Values, and the queue of nodes that have a trial value.
 
-    A calendar queue (Brown 1988): a node is listed in the bucket of its trial value, modulo
-    the number of buckets, and the least of the current bucket is searched for. With a node
-    or two a bucket that is several times faster than a heap, and as exact.
+    A calendar queue (Brown 1988). The values are divided into *days*, intervals of equal width.
+    The nodes of a day are in the bucket whose number is the day modulo the number of buckets,
+    and the least of the current day is searched for. With one or two nodes in a bucket that is
+    several times faster than a heap, and as exact.
     """
 
     u: np.ndarray  # (n,) float64: values of settled nodes, infinite elsewhere
     trial: np.ndarray  # (n,) float64: values of queued nodes, infinite before that
     heads: np.ndarray  # (buckets,) int32: first node of each bucket, -1 where none
-    days_per_unit: float  # 1 / width of a bucket
+    days_per_unit: float  # 1 / width of a day
     counters: np.ndarray  # (2,) int64: QUEUED, DAY
 
 
 # Places in Front.counters.
 QUEUED = 0  # nodes in the queue
-DAY = 1  # number of the current bucket, not reduced
+DAY = 1  # the current day
 
-# Days are whole numbers of 64 bits; a value that is farther away waits for this one.
+# Days are 64-bit integers; all greater values belong to this day.
 LAST_DAY = 2.0**62
 
 
@@ -38,7 +39,8 @@ def day_of(front, value):
 
 @inner_kernel
 def enqueue(nodes, front, n, value):
-    # A second-order value can be a little above what follows from it: that is due at once.
+    # A second-order value can be a little greater than a value that follows from it: that belongs
+    # to a day that has passed, so it is listed in the current one.
     day = max(day_of(front, value), front.counters[DAY])
     bucket = day & (front.heads.shape[0] - 1)
     head = front.heads[bucket]
@@ -76,7 +78,7 @@ def earliest_day(nodes, front):
 
 @inner_kernel
 def least_of_day(nodes, front, day):
-    """The node with the least trial value of a day, -1 where there is none."""
+    """The node with the least trial value up to the end of a day, -1 where there is none."""
     lowest, best = math.inf, -1
     n = front.heads[day & (front.heads.shape[0] - 1)]
     while n >= 0:
@@ -95,7 +97,7 @@ def least(nodes, front):
     n = least_of_day(nodes, front, day)
     while n < 0:
         day += 1
-        if day == last:  # nothing in a whole round: do not walk through empty days
+        if day == last:  # no node in a whole round of buckets: skip the empty days
             day = earliest_day(nodes, front)
         n = least_of_day(nodes, front, day)
     front.counters[DAY] = day

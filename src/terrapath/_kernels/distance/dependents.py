@@ -1,4 +1,4 @@
-"""Dependents: which nodes have a node in their stencils."""
+"""Dependents of a node: the nodes that have it in their stencils."""
 
 from typing import NamedTuple
 
@@ -9,9 +9,9 @@ from .stencils import AROUND, EDGE, around, vector_of
 
 
 class Dependents(NamedTuple):
-    """Which nodes have a node in their stencils: entries[first[n]:first[n + 1]].
+    """The dependents of node n are entries[first[n]:first[n + 1]].
 
-    An entry is 8 times the dependent's number plus the side on which it reads the node.
+    An entry is 8 times the dependent's number plus the side on which it reads node n.
     """
 
     first: np.ndarray  # (n + 1,) int32
@@ -20,7 +20,7 @@ class Dependents(NamedTuple):
 
 @inner_kernel
 def note_dependent(places, entries, m, n, side):
-    """Node n reads node m on a side."""
+    """Enter node n, which reads node m on a side, as a dependent of m."""
     if entries.shape[0] > 0:
         entries[places[m]] = 8 * n + side
     places[m] += 1
@@ -28,9 +28,9 @@ def note_dependent(places, entries, m, n, side):
 
 @kernel
 def note_dependents(nodes, nx, places, entries):
-    """Enter each node's dependents from places[node] on, which moves to their end.
+    """Enter the dependents of each node from places[node] on, and move that to their end.
 
-    places (n,). Where there are no entries yet, dependents are only counted.
+    places (n,). Where ``entries`` is empty, dependents are only counted.
     """
     for n in range(nodes.shape[0]):
         node = nodes[n]

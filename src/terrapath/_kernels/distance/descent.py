@@ -1,10 +1,10 @@
 """Values between the nodes of a distance field, and paths back to the source.
 
-Where the field is smooth, both follow from cubic interpolation. At kinks, where shortest
-paths from two sides meet, the scheme's own values are a little too low and a cubic's slope
-is a mean of both sides; near obstacles and unsettled nodes there is no cubic. There the
-value of a point p is, by Bellman's principle, the least of u(q) plus the length from q to p
-over the places q of a ring of nodes around p that can be seen from it.
+Where the field u is smooth, both follow from cubic interpolation. At kinks, where shortest paths
+from two sides meet, the scheme's own values are a little too low, and the slope of a cubic is a
+mean of both sides. Near obstacles and unsettled nodes there is no cubic. At such a point p, the
+value follows from Bellman's principle: the least of u(q) plus the length from q to p. Here q runs
+over a ring of nodes around p, and over the edges between them, as far as p can be seen from them.
 """
 
 import math
@@ -66,13 +66,13 @@ def cubic_slope(u):
 
 @inner_kernel
 def first_node(s, count):
-    """The first of the four nodes that the cubic at s takes part of, on an axis of ``count``."""
+    """The first of the four nodes that the cubic at s uses, on an axis of ``count`` nodes."""
     return min(max(math.floor(s) - 1, 0), count - 4)
 
 
 @inner_kernel
 def folded(w, cell, count):
-    """Weights of the four nodes; in the outermost cells there are three, by extrapolation."""
+    """Weights of the four nodes. In the outermost cells one of them is extrapolated from three."""
     if cell <= 0:
         return w[1] + 3.0 * w[0], w[2] - 3.0 * w[0], w[3] + w[0], 0.0
     if cell >= count - 2:
@@ -104,15 +104,15 @@ def interpolate(u, s, t):
     return Patch(value, slope_x, slope_y)
 
 
-# The eikonal equation makes the dual norm of a slope 1. At a kink the cubic's slope is a mean
-# of two, so that its norm is less; a place is smooth where it is not less by this share.
+# By the eikonal equation the dual norm of the slope is 1. At a kink the slope of the cubic is a
+# mean of two, so its norm is less. A place is smooth where the norm is less by at most this share.
 ROUGH = 0.01
 
 
 class Slope(NamedTuple):
     """The value of u at a smooth place, and the direction of steepest ascent under h.
 
-    The value is infinite where the place is not smooth.
+    The value is infinite where u is not smooth.
     """
 
     value: float
@@ -159,9 +159,9 @@ def slope_at(surface, space, field, x, y):
 
 
 class Approach(NamedTuple):
-    """The last stretch of a shortest path to a point: where it begins, u there and at the end.
+    """The last segment of a shortest path to a point: where it begins, and u at both ends.
 
-    It begins below the level.
+    u is below ``level`` where it begins.
     """
 
     x: float
@@ -171,8 +171,8 @@ class Approach(NamedTuple):
     level: float
 
 
-# Half the side of the ring around a point, in nodes. The scheme's values are too low up to
-# a node or two away from a kink; from this far away that makes no difference.
+# Half the side of the ring around a point, in nodes. The scheme's values are too low within one or
+# two nodes of a kink; at this distance that makes no difference.
 RING = 3
 
 
@@ -202,7 +202,7 @@ def best_share(h, ax, ay, bx, by, rise):
 
 @kernel
 def better_on_edge(surface, space, field, best, h, i, j, step_i, step_j, x, y):
-    """As ``better``, from any place between the nodes (i, j) and (i, j) + step."""
+    """Like ``better``, from any place between the nodes (i, j) and (i, j) + step."""
     grid = field.grid
     a, b = field.u[j, i], field.u[j + step_j, i + step_i]
     if not (max(a, b) < math.inf and min(a, b) < best.end):
@@ -216,7 +216,7 @@ def better_on_edge(surface, space, field, best, h, i, j, step_i, step_j, x, y):
 
 
 class Ring(NamedTuple):
-    """A rectangle of nodes around a cell, beyond the lattice in part."""
+    """A rectangle of nodes around a cell; part of it may be outside the lattice."""
 
     i0: int
     j0: int
@@ -234,7 +234,7 @@ def ring_around(grid, x, y, r):
 
 @kernel
 def best_on_side(surface, space, field, best, h, i, j, step_i, step_j, count, x, y):
-    """The best of the nodes (i, j) + k step and of what lies between them, 0 <= k < count."""
+    """The best approach from the nodes (i, j) + k step, 0 <= k < count, or from between them."""
     grid = field.grid
     for k in range(count):
         p, q = i + k * step_i, j + k * step_j
@@ -249,7 +249,7 @@ def best_on_side(surface, space, field, best, h, i, j, step_i, step_j, count, x,
 
 @kernel
 def best_on_ring(surface, space, field, best, h, ring, x, y):
-    """The best approach to (x, y) from a ring, or the one given."""
+    """The best approach to (x, y) from a ring, or ``best`` where none is better."""
     wide, high = ring.i1 - ring.i0 + 1, ring.j1 - ring.j0 + 1
     for j in (ring.j0, ring.j1):
         best = best_on_side(surface, space, field, best, h, ring.i0, j, 1, 0, wide, x, y)
@@ -291,7 +291,7 @@ def ring_is_open(space, field, ring, x, y):
 
 @inner_kernel
 def nodes_apart(grid, ax, ay, bx, by):
-    """Distance of two points in nodes."""
+    """Distance between two points, in nodes."""
     return math.hypot((ax - bx) / grid.dx, (ay - by) / grid.dy)
 
 
@@ -299,8 +299,8 @@ def nodes_apart(grid, ax, ay, bx, by):
 def approach(surface, space, field, x, y, level):
     """The best last segment of a path to (x, y), from nearby nodes or from the source.
 
-    It begins where u is less than ``level``; ``end`` is infinite where there is none. Smaller
-    rings of nodes are tried only where something blocks the view of the larger.
+    It begins where u is less than ``level``; ``end`` is infinite where there is none. A smaller
+    ring of nodes is tried only where something blocks the view of the larger one.
     """
     grid, best = field.grid, Approach(x, y, math.inf, math.inf, level)
     if nodes_apart(grid, x, y, field.source_x, field.source_y) <= RING + 1.0:
@@ -316,7 +316,7 @@ def approach(surface, space, field, x, y, level):
 
 @kernel
 def fill_distances(surface, space, field, points, values):
-    """The field at points (m, 2) of the lattice's rectangle, infinite where it was not solved."""
+    """The field at points (m, 2) of the lattice's rectangle, infinite where it is not known."""
     for m in range(points.shape[0]):
         x, y = points[m, 0], points[m, 1]
         values[m] = slope_at(surface, space, field, x, y).value
@@ -334,7 +334,7 @@ def clamp(x, low, high):
 
 @inner_kernel
 def step_down(grid, x, y, slope, step):
-    """A step against a slope, kept on the lattice; ``step`` counts in nodes."""
+    """A step against a slope, kept on the lattice. step : in nodes."""
     step /= nodes_apart(grid, slope.x, slope.y, 0.0, 0.0)
     right, top = grid.x0 + (grid.nx - 1) * grid.dx, grid.y0 + (grid.ny - 1) * grid.dy
     return clamp(x - step * slope.x, grid.x0, right), clamp(y - step * slope.y, grid.y0, top)
@@ -344,7 +344,8 @@ def step_down(grid, x, y, slope, step):
 def descend(surface, space, field, x, y, level, step):
     """The next point of a path down the field from (x, y), and u there or just before.
 
-    A midpoint step where the field is smooth and less than ``level``; else the best approach.
+    Where the field is smooth and less than ``level``: a step by the midpoint method. Elsewhere: the
+    beginning of the best approach.
     """
     grid, slope = field.grid, slope_at(surface, space, field, x, y)
     if slope.value < math.inf:
@@ -364,15 +365,15 @@ def descend(surface, space, field, x, y, level, step):
     return Slope(value, x + share * (best.x - x), y + share * (best.y - y))
 
 
-# A path ends with a straight step where it is so near to the source, in nodes.
+# A path that is this near to the source, in nodes, ends with a straight step.
 ARRIVED = 2.0
 
 
 @kernel
 def trace(surface, space, field, step, points):
-    """Walk down the field from points[0] to the source; returns how many points.
+    """Follow the field down from points[0] to the source; returns the number of points.
 
-    step : of the walk, in nodes. Returns 0 where the walk does not arrive.
+    step : in nodes. Returns 0 where the source is not reached.
     """
     level = math.inf
     x, y = points[0, 0], points[0, 1]

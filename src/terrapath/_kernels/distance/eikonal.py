@@ -4,9 +4,9 @@ With h^-1 = sum_k rho_k e_k e_k^T, rho_k >= 0 (see ``stencils``),
 
     sum_k rho_k max(0, u(x) - u(x + e_k), u(x) - u(x - e_k))^2 = 1
 
-is monotone and causal, so that each node is settled once, in the order of its value
-(Mirebeau 2014, 2019). The order follows from this equation; the value that a node is settled
-at, from the same one with differences of second order where the field is smooth.
+is monotone and causal, so that each node is settled once, in the order of the values
+(Mirebeau 2014, 2019). The order follows from this equation. The final value of a node follows
+from the same equation with second-order differences, where the field is smooth.
 """
 
 import math
@@ -56,7 +56,7 @@ def solve_upwind(a0, a1, a2, w0, w1, w2):
         a0, a2, w0, w2 = a2, a0, w2, w0
     if a2 < a1:
         a1, a2, w1, w2 = a2, a1, w2, w1
-    # Relative to a0: the squares of large values would lose what makes the difference.
+    # Relative to a0: squares of large values would round off their difference.
     d1, d2 = a1 - a0, a2 - a0
     if w0 * d1 * d1 >= 1.0:
         return a0 + 1.0 / math.sqrt(w0)
@@ -68,7 +68,7 @@ def solve_upwind(a0, a1, a2, w0, w1, w2):
 
 @inner_kernel
 def nearest(u, links, n, step, side):
-    """The smaller settled value of the two sides of a direction, infinite where there is none."""
+    """The smaller settled value on the two sides of a direction, infinite where there is none."""
     a = math.inf
     if links >> side & 1:
         a = u[n + step]
@@ -94,8 +94,8 @@ def first_order(u, node, nx, n):
     )
 
 
-# Second-order differences are used where the slope behind is at most this many times the slope
-# ahead. Elsewhere the field is not smooth.
+# Second-order differences are used where the slope beyond the neighbour is at most this many times
+# the slope between it and the node. Elsewhere the field is not smooth.
 STEEPEST = 2.0
 
 
@@ -110,10 +110,10 @@ class Difference(NamedTuple):
 def difference(trial, near, far, rho):
     """The difference along a direction, of second order where the field is smooth there.
 
-    3/2 (u - (4 u_1 - u_2) / 3) replaces u - u_1; near is u_1 and far u_2, infinite where
+    3/2 (u - (4 u_1 - u_2) / 3) replaces u - u_1. near : u_1. far : u_2. They are infinite where
     they may not be used.
     """
-    # Written so that infinite values make no NaN.
+    # Written such that infinite values do not lead to NaN.
     is_smooth = (far < near) & (far >= near - STEEPEST * (trial - near))
     a = (4.0 * near - far) / 3.0 if is_smooth else near
     w = 2.25 * rho if is_smooth else rho
@@ -129,7 +129,7 @@ def plain_difference(u, trial, n, step, rho):
 
 
 class Upwind(NamedTuple):
-    """The sign of a neighbour's vector, the values there and behind, infinite where unusable."""
+    """The sign of a neighbour's vector; the values there and one step farther, else infinite."""
 
     sign: int
     near: float
@@ -138,7 +138,7 @@ class Upwind(NamedTuple):
 
 @inner_kernel
 def upwind(u, links, n, step, side):
-    """The settled neighbour with the smaller value on a direction."""
+    """The settled neighbour with the smaller value along a direction."""
     ahead, behind, far, sign = math.inf, math.inf, math.inf, 1
     if links >> side & 1:
         ahead = u[n + step]
@@ -153,7 +153,7 @@ def upwind(u, links, n, step, side):
 
 @inner_kernel
 def linked_difference(u, trial, links, n, step, side, rho):
-    """``difference``, of the neighbours that links lead to."""
+    """``difference``, from the neighbours that links lead to."""
     found = upwind(u, links, n, step, side)
     return difference(trial, found.near, found.far, rho)
 
@@ -168,10 +168,10 @@ def model_at(source, row, column):
 
 @inner_kernel
 def factored_difference(source, nx, u, trial, node, n, side, rho):
-    """``linked_difference`` of u - v, plus the derivative of the model v itself.
+    """``linked_difference`` of u - v, plus the derivative of the model v.
 
-    Where no neighbour is nearer to the source, a is infinite, and w the share of the model's
-    derivative in the equation.
+    Where no neighbour is nearer to the source, a is infinite, and w is what the model's
+    derivative adds to the left side of the equation.
     """
     e = vector_of(node, side)
     found = upwind(u, node.links, n, e.y * nx + e.x, side)
@@ -192,13 +192,14 @@ def factored_difference(source, nx, u, trial, node, n, side, rho):
     return Difference(math.inf, rho * slope * slope)
 
 
-# The model's derivatives make up at most the rest of this share of the equation.
+# Where the model's own derivatives would leave less than this share of the equation to the
+# neighbours, they are not subtracted.
 LEAST_SHARE = 0.1
 
 
 @kernel
 def solve_factored(u, trial, node, source, nx, n):
-    """As ``second_order``, in the source's window."""
+    """Like ``second_order``, in the source's window."""
     d0 = factored_difference(source, nx, u, trial, node, n, 0, np.float64(node.rho0))
     d1 = factored_difference(source, nx, u, trial, node, n, 2, np.float64(node.rho1))
     d2 = factored_difference(source, nx, u, trial, node, n, 4, np.float64(node.rho2))
@@ -212,7 +213,7 @@ def solve_factored(u, trial, node, source, nx, n):
 
 @inner_kernel
 def second_order(u, trial, node, source, nx, n):
-    """The value of a node whose first-order value is ``trial``, by second-order differences."""
+    """The second-order value of a node whose first-order value is ``trial``."""
     links = node.links
     if links & WINDOW:
         return solve_factored(u, trial, node, source, nx, n)
@@ -247,7 +248,7 @@ def by_edges(nodes, u, nx, n):
 
 @inner_kernel
 def offered(nodes, front, nx, n, dependent, side):
-    """The value that follows for a dependent from the settled nodes, n being the newest of them."""
+    """The value that a dependent gets from the settled nodes; n was settled last."""
     if side == EDGE:
         return by_edges(nodes, front.u, nx, dependent)
     if front.trial[dependent] == math.inf:
@@ -265,7 +266,7 @@ def offer(nodes, front, dependents, nx, n):
             continue
         before = front.trial[dependent]
         value = offered(nodes, front, nx, n, dependent, np.int64(entry & 7))
-        # Written so that no number, where lengths overflow, is queued; nor is infinity.
+        # Written such that NaN, from lengths that overflow, is not queued; nor is infinity.
         if not value < before:
             continue
         if before == math.inf:
@@ -277,11 +278,11 @@ def offer(nodes, front, dependents, nx, n):
 
 @inner_kernel
 def settled_value(nodes, front, source, nx, n):
-    """The value that node n is settled at."""
+    """The final value of node n."""
     value = second_order(front.u, front.trial[n], nodes[n], source, nx, n)
     if nodes[n].around:
         edge = by_edges(nodes, front.u, nx, n)
-        # Written so that no number, where the stencil has no settled neighbour, is replaced.
+        # Written such that NaN is replaced, too: the stencil may have no settled neighbour.
         if not value < edge:
             value = edge
     return value if value < math.inf else front.trial[n]
@@ -289,7 +290,7 @@ def settled_value(nodes, front, source, nx, n):
 
 @kernel
 def plant(nodes, front, dependents, nx, seeds, values):
-    """Settle the seeds at their values, and offer them to their dependents."""
+    """Settle the seeds at their values, and give their dependents trial values."""
     for m in range(seeds.shape[0]):
         front.u[seeds[m]] = values[m]
     for m in range(seeds.shape[0]):
@@ -298,7 +299,7 @@ def plant(nodes, front, dependents, nx, seeds, values):
 
 @kernel
 def march(nodes, front, dependents, source, nx, most, limit):
-    """Settle up to ``most`` nodes, none of a trial value above ``limit``; returns how many."""
+    """Settle up to ``most`` nodes with trial values up to ``limit``; returns how many."""
     for settled in range(most):
         if front.counters[QUEUED] == 0:
             return settled

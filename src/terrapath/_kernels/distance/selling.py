@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from ..compiler import inner_kernel
 
-# Superbase flips: some log2 of the anisotropy are needed.
+# The largest number of superbase flips; about log2 of the anisotropy are needed.
 MOST_FLIPS = 200
 
 
@@ -38,7 +38,7 @@ def products(d, b):
 def obtuse_superbase(d, b):
     """The D-obtuse superbase that Selling's algorithm makes of b.
 
-    A neighbour's superbase is mostly right already.
+    b : where it begins. The superbase of a neighbouring node is mostly right already.
     """
     for _ in range(MOST_FLIPS):
         p = products(d, b)

@@ -3,8 +3,8 @@
 Selling's algorithm writes h^-1 as a sum of three rank-one tensors along lattice vectors,
 h^-1 = sum_k rho_k e_k e_k^T with rho_k >= 0, whatever the anisotropy (Selling 1874; Mirebeau
 2014, FM-LBR; Mirebeau 2019, Riemannian fast-marching with Voronoi's first reduction). Nodes
-are numbered j * nx + i, and all lattice vectors are in nodes, so that the metric comes in per
-node: h11 dx^2, h12 dx dy, h22 dy^2.
+are numbered j * nx + i. All lattice vectors are in nodes, and so is the metric that belongs to
+them: h11 dx^2, h12 dx dy, h22 dy^2.
 """
 
 import math
@@ -19,8 +19,8 @@ from ..surface.metric_rows import H11, H12, H22, fill_row
 from ..surface.surfaces import Metric
 from .selling import Superbase, obtuse_superbase, products
 
-# Bits of a node's links: the neighbour on side 2 k + (0: +e_k, 1: -e_k) may be used; so may
-# the one after it (shifted by SECOND); the node lies in the source's window.
+# Bits of a node's links: the neighbour on side 2 k + (0: +e_k, 1: -e_k) may be used; the node one
+# vector farther may be used (shifted by SECOND); the node lies in the source's window.
 SECOND = 6
 ALL_SIDES = (1 << 6) - 1
 ALL_LINKS = (1 << 12) - 1
@@ -37,18 +37,18 @@ NODE = record(
     ("rho2", np.float32),
     ("links", np.uint16),
     ("around", np.uint16),  # bit k: the k-th node around may be reached along an edge
-    ("after", np.int32),  # the next node of the same bucket, -1 where none
-    ("before", np.int32),  # the one before; -2 - bucket at the head of a bucket's list
+    ("after", np.int32),  # the next node in the list of the same bucket, -1 where none
+    ("before", np.int32),  # the node before it in that list; at the head, -2 - bucket
 )
 
 
-# Where links of a stencil are missing it may not reach out far enough: then a node can be
-# reached along the edges to the nodes around it too. So reads a node on side EDGE.
+# A stencil with missing links may not reach far enough. Then the node can also be reached along the
+# edges to the eight nodes around it; a node that is read along an edge is on side EDGE.
 EDGE = 6
 AROUND = 8
 
 
-# Laying stencils
+# Making stencils
 
 
 @inner_kernel
@@ -99,7 +99,7 @@ def links_inside(grid, i, j, x0, y0, x1, y1):
 
 @inner_kernel
 def around(k):
-    """The vector to the k-th of the nodes around a node; the opposite one is 7 - k."""
+    """The vector to the k-th of the eight nodes around a node; the opposite one is 7 - k."""
     place = k if k < 4 else k + 1
     return Vector(place % 3 - 1, place // 3 - 1)
 
@@ -126,20 +126,20 @@ def is_cut_off(links, x0, y0, x1, y1):
     )
 
 
-# The bits of one direction, to be shifted by twice its number.
+# The bits of direction 0; those of direction k are shifted by 2 k.
 DIRECTION = 3 | 3 << SECOND
 
 
 @inner_kernel
 def lay_stencil(grid, i, j, h, b, nodes):
-    """Lay the stencil of node (i, j), where h is the metric per node.
+    """Write the stencil of node (i, j), where h is the metric in units of nodes.
 
-    b is the superbase to start from; the one that was found is returned.
+    b : the superbase to start from. Returns the superbase that was found.
     """
     d = inverse(h)
     b = obtuse_superbase(d, b)
     p = products(d, b)
-    # e_k is b_k turned by a right angle. What does not fit in 16 bits leads off the lattice.
+    # e_k is b_k turned by a right angle. A vector too long for 16 bits leads off the lattice.
     x0, y0, x1, y1 = int(-b.y0), int(b.x0), int(-b.y1), int(b.x1)
     links = links_inside(grid, i, j, x0, y0, x1, y1)
     node = nodes[j * grid.nx + i]
@@ -163,7 +163,7 @@ def per_node(h11, h12, h22, grid):
 
 @kernel
 def lay_surface_stencils(surface, grid, columns, row, nodes):
-    """Stencils of a surface's metric at all nodes of a lattice.
+    """Write the stencils of a surface's metric at all nodes of a lattice.
 
     columns : of ``columns_of``; row : workspace of ``fill_row``.
     """
@@ -178,7 +178,7 @@ def lay_surface_stencils(surface, grid, columns, row, nodes):
 
 @kernel
 def lay_tensor_stencils(tensors, grid, nodes):
-    """Stencils of a metric that is given at all nodes: tensors (ny, nx, 3), h11, h12, h22."""
+    """Write the stencils of a metric given at all nodes: tensors (ny, nx, 3), h11, h12, h22."""
     b = Superbase(1.0, 0.0, 0.0, 1.0)
     for j in range(grid.ny):
         for i in range(grid.nx):
@@ -225,7 +225,7 @@ def rho_of(node, side):
 
 @inner_kernel
 def blocked_side(space, grid, n, vector, links, side):
-    """The bits of one side whose segments, one or two vectors long, are not free."""
+    """The bits of one side whose segments, one and two vectors long, are not free."""
     x, y = grid.x0 + n % grid.nx * grid.dx, grid.y0 + n // grid.nx * grid.dy
     dx, dy = vector.x * grid.dx, vector.y * grid.dy
     one, two = 1 << side, 1 << side + SECOND
@@ -250,7 +250,7 @@ def free_edges(space, grid, n):
 
 @kernel
 def cut_links(space, grid, nodes):
-    """Take away the links of all nodes that cross or touch an obstacle."""
+    """Remove all links that cross or touch an obstacle."""
     for n in range(nodes.shape[0]):
         node = nodes[n]
         before = np.int64(node.links)
@@ -265,7 +265,7 @@ def cut_links(space, grid, nodes):
 
 @kernel
 def block_nodes(grid, blocked, nodes):
-    """Take away all links to blocked nodes, blocked (ny nx,) uint8."""
+    """Remove all links to blocked nodes. blocked : (ny nx,) uint8."""
     for n in range(nodes.shape[0]):
         node = nodes[n]
         links = np.int64(node.links)
@@ -302,5 +302,5 @@ def length_at(node, e):
 
 @inner_kernel
 def edge_length(nodes, n, e, m):
-    """Length of the edge e from node n to m: the mean of those under the metrics of both."""
+    """Length of the edge e from node n to m: the mean of its lengths under the metrics of both."""
     return 0.5 * (length_at(nodes[n], e) + length_at(nodes[m], e))

@@ -1,4 +1,4 @@
-"""What a moving polyline runs into."""
+"""The walls and corners that a moving polyline meets, and when."""
 
 import math
 from typing import NamedTuple
@@ -12,9 +12,9 @@ from ..space.free_space import Grid, span
 class Walls(NamedTuple):
     """Straight walls with free ground to the right of each, and the corners it can bend round.
 
-    Edges and corners stand a little behind the places where a path that meets them is put, so
-    that a path along a wall is clear of it whatever the rounding. The edges of cell
-    c = j * nx + i are ``edge_ids[edge_first[c]:edge_first[c + 1]]``, and likewise the corners.
+    Edges and corners stand a little behind the points where a path touches them, so that rounding
+    cannot put a path along a wall behind it. The edges of cell c = j * nx + i are
+    ``edge_ids[edge_first[c]:edge_first[c + 1]]``, and likewise the corners.
     """
 
     grid: Grid
@@ -44,7 +44,7 @@ def first_root(q0, q1, q2, after):
 
 @kernel
 def corner_time(ax, ay, ux, uy, bx, by, vx, vy, cx, cy):
-    """When the segment a-b, its ends moving by u and v in unit time, first meets the point c."""
+    """When the segment a-b, whose ends move by u and v in unit time, first meets the point c."""
     ex, ey, fx, fy = bx - ax, by - ay, vx - ux, vy - uy
     wx, wy = cx - ax, cy - ay
     q0 = ex * wy - ey * wx

@@ -7,7 +7,7 @@ from ..compiler import kernel
 def fill_basis(knots, degree, shares, first, weights):
     """The B-splines that are not 0 at parameters (m,) between the outermost knots.
 
-    first (m,) : which is the first of them. weights (m, degree + 1) : their values.
+    first (m,) : the number of the first of them. weights (m, degree + 1) : their values.
     """
     for m in range(shares.shape[0]):
         t, low, high = shares[m], degree, knots.shape[0] - degree - 1
@@ -15,7 +15,7 @@ def fill_basis(knots, degree, shares, first, weights):
             middle = (low + high) // 2
             low, high = (low, middle) if t < knots[middle] else (middle, high)
         first[m], weights[m, 0] = low - degree, 1.0
-        # Cox and de Boor: each of one degree is shared between two of the next.
+        # Cox and de Boor: each B-spline adds to two of the next degree.
         for d in range(1, degree + 1):
             carried = 0.0
             for k in range(d):
@@ -28,10 +28,10 @@ def fill_basis(knots, degree, shares, first, weights):
 
 @kernel
 def solve_banded(rows, values):
-    """Solve A x = values, of which values (n, 2) becomes the solution; rows are used up.
+    """Solve A x = values in place: values (n, 2) becomes x, and rows is overwritten.
 
-    rows (n, 2 k + 1) : entry (i, j) of A is rows[i, k + j - i]. No rows change places, which
-    matrices that are totally positive do not need.
+    rows (n, 2 k + 1) : entry (i, j) of A is rows[i, k + j - i]. Without pivoting, which totally
+    positive matrices do not need.
     """
     n, k = rows.shape[0], rows.shape[1] // 2
     for i in range(n):

@@ -1,9 +1,9 @@
 """The geodesic equation on the plane, with the Jacobi field along it.
 
-A geodesic of unit speed leaves the start at some angle on the plane. How far its end moves
-per radian of that angle is the signed length j of the normal Jacobi field that vanishes at
-the start: j'' + K j = 0 (do Carmo 1992, chapter 5), K being the Gaussian curvature. Where j
-is 0 again the end is conjugate to the start.
+A geodesic of unit speed leaves the start at some angle on the plane. The Jacobi field j says how
+far its end moves, across the geodesic, per radian of that angle. It is 0 at the start, and
+j'' + K j = 0 (do Carmo 1992, chapter 5), where K is the Gaussian curvature. Where j is 0 again,
+the point is conjugate to the start.
 """
 
 import math
@@ -15,7 +15,7 @@ from ..surface.surfaces import Jet, Metric, jet_at, log_cost_at, metric_at
 
 
 class Frame(NamedTuple):
-    """The metric at a point without its cost, and the inner products with second derivatives.
+    """The metric at a point without cost layers, and inner products of the layers' derivatives.
 
     Sums run over the weighted layers: a_ijl = sum_k (d_i d_j x_k) (d_l x_k).
     """
@@ -94,8 +94,8 @@ def christoffel(frame):
 def curvature(frame, g):
     """Gaussian curvature by the equation of Gauss.
 
-    K d = <N s_11, N s_22> - |N s_12|^2 with N the normal part of the second derivatives,
-    which is what the tangential part, given by the Christoffel symbols, leaves of them.
+    K d = <N s_11, N s_22> - |N s_12|^2, where N takes the normal part of the second derivatives.
+    The Christoffel symbols give the tangential part; the rest is normal.
     """
     h = frame.h
     tangential = g.g1_11 * frame.a221 + g.g2_11 * frame.a222
@@ -105,7 +105,7 @@ def curvature(frame, g):
 
 @inner_kernel
 def costly_christoffel(frame, g):
-    """The symbols of c^2 h from those of h, p being log c.
+    """The symbols of c^2 h from those of h, where p is log c.
 
     Gamma^k_ij + delta^k_i p_j + delta^k_j p_i - h_ij h^kl p_l (do Carmo 1992, chapter 8).
     """
@@ -149,8 +149,8 @@ def derivative(surface, s):
 def unit_state(surface, x, y, angle):
     """The state at the start of the unit-speed geodesic that leaves at an angle on the plane.
 
-    The direction u turns by |du|_h sin / |u|_h = sqrt(d) / |u|_h^2 under h for each radian on
-    the plane, which is the field's first derivative.
+    For each radian on the plane, the direction u turns under h by
+    |du|_h sin / |u|_h = sqrt(d) / |u|_h^2. That is the first derivative of the Jacobi field.
     """
     h = metric_at(surface, x, y)
     dx, dy = math.cos(angle), math.sin(angle)
@@ -164,7 +164,7 @@ def unit_state(surface, x, y, angle):
 
 @kernel
 def fill_christoffel(surface, points, symbols):
-    """Christoffel symbols (m, 2, 2, 2), index order [k, i, j]."""
+    """Christoffel symbols (m, 2, 2, 2) at points, index order [k, i, j]."""
     for m in range(points.shape[0]):
         frame = frame_at(surface, points[m, 0], points[m, 1])
         g = costly_christoffel(frame, christoffel(frame))
@@ -178,7 +178,7 @@ def fill_christoffel(surface, points, symbols):
 
 @kernel
 def fill_curvature(surface, points, curvatures):
-    """Gaussian curvatures (m,)."""
+    """Gaussian curvatures (m,) at points."""
     for m in range(points.shape[0]):
         frame = frame_at(surface, points[m, 0], points[m, 1])
         curvatures[m] = costly_curvature(frame, christoffel(frame))

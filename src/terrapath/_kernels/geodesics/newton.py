@@ -1,8 +1,8 @@
-"""Newton's method for polylines of least energy: what lies above one, and its step.
+"""Newton's method for polylines of least energy: the surface along a polyline, and one step.
 
 The energy of a polyline is its number of pieces times the sum of its squared chords in R^n,
-each times the mean of the squared cost C = c^2 at its ends. Least energy makes the pieces equally
-long and their sum, whose square the energy then is, least.
+each times the mean of the squared cost C = c^2 at its ends. At least energy, all pieces have the
+same length and their sum is least; the energy is then the square of that sum.
 """
 
 import math
@@ -51,7 +51,7 @@ def entry(blocks, i):
 
 
 class Strand(NamedTuple):
-    """A polyline (m,), and what lies above it. Its inner points are counted from 0, too."""
+    """A polyline (m,), and the surface along it. Inner points are numbered from 0, too."""
 
     points: np.ndarray  # (m, 2), map units
     weights: np.ndarray  # (layers,)
@@ -64,7 +64,7 @@ class Strand(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What a step of Newton's method is worked out in, and what it finds."""
+    """The workspace of a Newton step, and its result."""
 
     derivative: np.ndarray  # (m - 2, 2), half the energy's by each inner point
     move: np.ndarray  # (m - 2, 2), map units
@@ -110,7 +110,7 @@ def squared_chord(strand, piece):
 def own_block(strand, i, curvature):
     """Half the energy's second derivative by inner point i.
 
-    Of what the layers and the cost bend, the share ``curvature`` is taken.
+    curvature : the share that is taken of the second derivatives of the layers and the cost.
     """
     at = i + 1
     m, cost = frame_product(strand, at, at), strand.costs[at]
@@ -147,7 +147,7 @@ def link_block(strand, i, curvature):
 
 @kernel
 def confined(m, projector):
-    """P M P + (I - P): M for the moves that P lets through, the identity for the others."""
+    """P M P + (I - P): M for the moves that the projector P allows, the identity for the others."""
     k = product(product(projector, m), projector)
     p = projector
     return Block(k.a + 1.0 - p.a, k.b - p.b, k.c - p.c, k.d + 1.0 - p.d)
@@ -176,8 +176,8 @@ def put(blocks, i, m):
 def eliminate(strand, projectors, curvature, pivots, links, step):
     """Forward elimination of H step = -derivative; ``step`` holds the derivative on entry.
 
-    Returns the row at which H is found not to be positive definite, whose pivot is then left
-    as it is, or the number of rows.
+    Returns the number of rows; or, where H is not positive definite, the row that shows it. The
+    pivot of that row is left as it is.
     """
     for i in range(step.shape[0]):
         p = entry(projectors, i)
@@ -201,7 +201,7 @@ def eliminate(strand, projectors, curvature, pivots, links, step):
 
 @kernel
 def substitute(pivots, links, step, rows):
-    """Back substitution from row ``rows`` - 1 upwards; what lies below is taken as it is."""
+    """Back substitution from row ``rows`` - 1 upwards; the rows below it are already solved."""
     for i in range(rows - 1, -1, -1):
         gx, gy = step[i, 0], step[i, 1]
         if i + 1 < step.shape[0]:
@@ -237,10 +237,10 @@ def newton_step(strand, projectors, curvature, workspace):
     """Newton's step for the inner points of a polyline; both ends stay.
 
     projectors : (m - 2, 2, 2), onto the moves that each point is free to make.
-    curvature : 1 for Newton's step; 0 leaves out what the layers and the cost bend, which
-    makes H positive definite always.
-    Where H is not positive definite, a direction of negative curvature instead. Returns
-    whether it is.
+    curvature : 1 for Newton's step; 0 leaves out the second derivatives of the layers and the
+    cost, so that H is always positive definite.
+    Where H is not positive definite, the move is a direction of negative curvature instead.
+    Returns whether H is positive definite.
     """
     derivative, step = workspace.derivative, workspace.move
     fill_derivative(strand, projectors, derivative)
@@ -254,7 +254,7 @@ def newton_step(strand, projectors, curvature, workspace):
     return True
 
 
-# What lies above a polyline
+# The surface along a polyline
 
 
 @inner_kernel
@@ -268,10 +268,7 @@ def put_squared_cost(row, log):
 
 @kernel
 def fill_pieces(strand):
-    """What follows from the jets of the points and of the cost there. Returns the energy.
-
-    That is the pieces' number times the sum of squared chords, each times its squared cost.
-    """
+    """Fill chords, stiffness, pull and drift from the jets at the points. Returns the energy."""
     points, jets, chords, costs = strand.points, strand.jets, strand.chords, strand.costs
     pieces, energy, squares = chords.shape[0], 0.0, 0.0
     for m in range(pieces):
@@ -293,7 +290,7 @@ def fill_pieces(strand):
 
 @kernel
 def lift(surface, strand):
-    """Find what lies above the points of a polyline, and how much energy it has."""
+    """Evaluate the surface at the points of a polyline. Returns the polyline's energy."""
     for m in range(strand.points.shape[0]):
         x, y = strand.points[m, 0], strand.points[m, 1]
         for layer in range(strand.weights.shape[0]):

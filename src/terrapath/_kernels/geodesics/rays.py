@@ -1,7 +1,7 @@
 """Rays: geodesics followed from their start, to a length or to where they leave the bounds.
 
-By an embedded Runge-Kutta method whose two error estimates are combined as Hairer, Norsett and
-Wanner do for Dormand and Prince's 8(5, 3) (1993, section II.10).
+The method is the embedded Runge-Kutta method 8(5, 3) of Dormand and Prince. Its two error
+estimates are combined as by Hairer, Norsett and Wanner (1993, section II.10).
 """
 
 import math
@@ -15,7 +15,7 @@ from .equation import State, derivative, unit_state
 
 
 class Tableau(NamedTuple):
-    """An explicit method; arrays, because constants of this size keep kernels uncached."""
+    """An explicit Runge-Kutta method. As arguments, because Numba cannot cache such constants."""
 
     a: np.ndarray  # (stages, stages) float64
     b: np.ndarray  # (stages,)
@@ -25,7 +25,7 @@ class Tableau(NamedTuple):
 
 @cache
 def dormand_prince():
-    """The tableau of order 8; SciPy's, which takes long to import."""
+    """SciPy's tableau of order 8. It is imported here, because the import takes long."""
     from scipy.integrate import DOP853
 
     return Tableau(*map(np.ascontiguousarray, (DOP853.A, DOP853.B, DOP853.E3, DOP853.E5)))
@@ -33,8 +33,8 @@ def dormand_prince():
 
 _SAFETY, _LEAST_FACTOR, _MOST_FACTOR = 0.9, 0.2, 6.0
 
-# A step is too short to be taken at this share of the arc length so far and of the unit of
-# length: no curve leads through two rows that differ by rounding alone.
+# The shortest step, as a share of the arc length so far plus the unit of length. Closer rows would
+# differ by rounding alone, and no curve could be drawn through them.
 _NOWHERE = 1e-15
 
 # How a ray ended.
@@ -87,8 +87,8 @@ def estimate(slopes, weights, scale, component):
 def error_norm(tableau, h, s, end, slopes, unit, tolerance):
     """Estimated error over the tolerance: a step is accepted up to 1.
 
-    Positions are held against ``unit``, a length that suits the surface; velocities are of
-    unit length; the Jacobi field, which may grow exponentially, is held against itself.
+    Errors of positions are relative to ``unit``, a length that suits the surface. Velocities have
+    unit length. Errors of the Jacobi field, which may grow exponentially, are relative to it.
     """
     field = 1.0 + max(abs(s.dj), abs(end.dj), abs(s.j) / unit, abs(end.j) / unit)
     fifth, third = 0.0, 0.0
@@ -124,7 +124,7 @@ def is_inside_at(bounds, a, b, h, t):
 def share_outside(bounds, a, b, h):
     """A share of the step from a to b at which it is outside; -1 where it never is.
 
-    Looked for at its end and where it turns back in x or in y.
+    The end is tested, and the points where the step turns back in x or in y.
     """
     turn = 2.0
     if a.vx * b.vx < 0.0:
@@ -161,7 +161,7 @@ def record(rows, k, length, s):
 
 @inner_kernel
 def overshoot(bounds, s):
-    """Arc length, about, by which a state has left the bounds; below 0 where it falls short."""
+    """About the arc length since a state left the bounds; negative while it is inside."""
     most = -math.inf
     if s.vx != 0.0:
         edge = bounds[2] if s.vx > 0.0 else bounds[0]
@@ -208,7 +208,7 @@ def trace(surface, tableau, bounds, x, y, angle, length, longest_step, unit, tol
             h = length - done
         end = runge_kutta_step(surface, tableau, s, h, slopes)
         error = error_norm(tableau, h, s, end, slopes, unit, tolerance)
-        if not error <= 1.0:  # also where it is not a number
+        if not error <= 1.0:  # also where it is NaN
             shrink = _SAFETY * error**-0.125 if error < math.inf else _LEAST_FACTOR
             h *= max(shrink, _LEAST_FACTOR)
             continue

@@ -1,8 +1,9 @@
 """A growing planar point set in square buckets: nearest point, points within a radius.
 
-The points are rows whose first two entries are x and y. Those that were there when the
-buckets were last laid out are numbered bucket by bucket, row by row: a stretch of buckets is
-a stretch of points, read one after another. Later ones are in a linked list of their bucket.
+The points are rows whose first two entries are x and y. From time to time all points are sorted
+into the buckets: then they are numbered bucket by bucket, row by row, so that the points of
+neighbouring buckets lie together in memory. Points that are added later are in a linked list of
+their bucket.
 """
 
 import math
@@ -62,10 +63,10 @@ def resize(buckets, width, height, side):
 
 @kernel
 def lay_out(buckets, points, count, numbers):
-    """Lay out the first points, one at least, in empty buckets.
+    """Sort the first ``count`` points, at least one, into empty buckets.
 
-    numbers (count,) is filled with the number that each is to be given. The very first stays
-    number 0, outside the order, as a later point of its bucket.
+    numbers (count,) is filled with the new number of each point. Point 0 keeps its number: it
+    is outside the order, in the linked list of its bucket.
     """
     for p in range(count):
         put(buckets, points, p)
@@ -86,7 +87,7 @@ def lay_out(buckets, points, count, numbers):
 
 @inner_kernel
 def note(points, p, x, y, limit, found, count):
-    """Note a point, to be kept where it is near enough: return how many are. Without a branch."""
+    """Note a point, but count it only where it is near enough. No branch is faster than one."""
     found[count].vertex = p
     found[count].squared = squared_distance(points, p, x, y)
     return count + (found[count].squared <= limit)
@@ -116,7 +117,7 @@ def within(buckets, points, x, y, radius, found):
 
 @inner_kernel
 def nearer(points, p, x, y, best):
-    """The nearer of two points, the first of them if both are as near (best -1: none yet)."""
+    """The nearer of p and ``best`` (-1: none yet); of two as near, the lower number."""
     if best < 0:
         return p
     squared, limit = squared_distance(points, p, x, y), squared_distance(points, best, x, y)
@@ -139,7 +140,7 @@ def nearest_in_row(buckets, points, x, y, row, left, right, best):
 
 @kernel
 def nearest(buckets, points, x, y):
-    """The point nearest to (x, y), the first of several; the set must not be empty.
+    """The point nearest to (x, y), of several the lowest number; the set must not be empty.
 
     Rings of buckets are searched outwards until none farther out can hold a nearer one.
     """

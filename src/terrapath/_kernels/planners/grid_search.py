@@ -1,8 +1,8 @@
 """Dijkstra's algorithm and A* over the nodes of a lattice, with edges measured under h.
 
-Start and goal rarely lie on a node: they are two further vertices, joined to the nodes
-nearby. An edge is as long as in the tree planners, max(Line-R, chord). So the chord to the
-goal is a consistent heuristic, and the first path that settles a vertex is its shortest.
+Start and goal rarely lie on a node, so they are two more vertices, joined to the nodes nearby.
+As in the tree planners, the length of an edge is max(Line-R, chord). So the chord to the goal
+is a consistent heuristic, and the first path that settles a vertex is its shortest.
 """
 
 import math
@@ -18,20 +18,20 @@ from .tree import COST, TENSOR, X, Y, chord_between, edge_length, survey
 # Places in Graph.counters.
 OPEN = 0  # vertices in the heap
 SETTLED = 1  # vertices whose shortest path is known
-VERTICES = 2  # vertices that an edge was considered to
+VERTICES = 2  # vertices to which an edge was considered
 CONSIDERED = 3  # edges considered
 PRUNED = 4  # edges that the chord ruled out
 INTEGRATED = 5  # edges measured by Line-R
 CHECKED = 6  # edges tested against obstacles
 COUNTERS = 7
 
-# What a vertex's slot says where it is not in the heap, whose first slot is 1.
+# The slot of a vertex that is not in the heap; the heap's own slots start at 1.
 UNSEEN = 0
 DONE = -1
 WITHOUT_PATH = -2
 
-# A vertex: its parent, its slot of the heap, and the metric tensor. That comes last: to
-# Numba, a tensor with more behind it would be a tensor.
+# A vertex: its parent, its slot of the heap, and the metric tensor. The tensor comes last: Numba
+# would take a record that only begins with a tensor for a tensor.
 VERTEX = record(
     ("parent", np.int32),  # -1 at the start
     ("slot", np.int32),
@@ -44,7 +44,7 @@ ENTRY = record(("key", np.float64), ("vertex", np.int32))
 
 
 class Nodes(NamedTuple):
-    """Where the vertices lie, and which are joined: what stays as it is."""
+    """Where the nodes lie and which vertices are joined. It does not change during the search."""
 
     x: np.ndarray  # (nx,) float64
     y: np.ndarray  # (ny,) float64
@@ -55,10 +55,10 @@ class Nodes(NamedTuple):
 class Graph(NamedTuple):
     """The nodes row by row, then the start, then the goal. All arrays are filled in place.
 
-    Few arrays, because each costs time wherever they are handed through a call.
+    Few arrays, because passing each of them to a call costs time.
     """
 
-    vertices: np.ndarray  # (nx * ny + 2,) VERTEX, zeros before they are seen
+    vertices: np.ndarray  # (nx * ny + 2,) VERTEX, zeros before an edge leads there
     places: np.ndarray  # (nx * ny + 2, LIFTED + layers) float64, as a tree's
     heap: np.ndarray  # (nx * ny + 3,) ENTRY: the open vertices, four children a slot, from slot 1
     counters: np.ndarray  # (COUNTERS,) int64
@@ -66,7 +66,7 @@ class Graph(NamedTuple):
 
 
 class Options(NamedTuple):
-    """What the planner was asked for."""
+    """The planner's options."""
 
     panel: float  # longest stretch that one application of Line-R measures
     informed: bool  # A*: ordered by cost plus chord to the goal; otherwise by cost alone
@@ -78,7 +78,7 @@ class Options(NamedTuple):
 
 @kernel
 def raise_to(vertices, heap, slot, vertex, key):
-    """Put a vertex into an empty slot of the heap, or above it where its key says so."""
+    """Put a vertex into an empty slot of the heap, or further up if its key is less."""
     while slot > 1:
         above = (slot + 2) // 4
         if heap[above].key <= key:
@@ -93,7 +93,7 @@ def raise_to(vertices, heap, slot, vertex, key):
 
 @kernel
 def empty_slot_below(vertices, heap, slot, key, last):
-    """Move children with lesser keys up into an empty slot; return the slot left empty."""
+    """Move children with smaller keys up into an empty slot; return the slot left empty."""
     while True:
         first = 4 * slot - 2
         least = slot
@@ -123,7 +123,7 @@ def take_first(vertices, heap, last):
 
 @kernel
 def place(surface, graph, v, x, y):
-    """Write a vertex's position and what is cached with it; no path leads there yet."""
+    """Write what is stored of a vertex's position; no path leads there yet."""
     survey(surface, graph, v, x, y)
     graph.places[v, COST] = math.inf
     vertex = graph.vertices[v]
@@ -141,7 +141,7 @@ def discover(surface, nodes, graph, node):
 
 @kernel
 def enter(graph, options, v):
-    """Put a vertex where its cost belongs in the heap."""
+    """Put a vertex into the heap, or move it up where its cost is now less."""
     key = graph.places[v, COST]
     if options.informed:
         key += chord_between(graph, v, graph.vertices.shape[0] - 1)
@@ -154,7 +154,7 @@ def enter(graph, options, v):
 
 @kernel
 def measure(surface, space, graph, options, u, v, chord):
-    """Measure the edge u-v, and let the path to v end with it where that is shorter."""
+    """Measure the edge u-v. Where the path to v is shorter through it, make u the parent of v."""
     origin, place = graph.places[u], graph.places[v]
     graph.counters[INTEGRATED] += 1
     length = max(edge_length(surface, graph, u, v, options.panel), chord)
@@ -169,9 +169,9 @@ def measure(surface, space, graph, options, u, v, chord):
 
 @inner_kernel
 def relax(surface, space, nodes, graph, options, u, v):
-    """Let the path to v go through u where that is shorter.
+    """Make u the parent of v where the path to v is shorter through u.
 
-    An edge whose cost-to-come plus chord cannot win is never integrated.
+    An edge is measured only where the cost of u plus the chord is less than the cost of v.
     """
     if graph.vertices[v].slot != DONE:
         if graph.vertices[v].slot == UNSEEN:
@@ -186,7 +186,7 @@ def relax(surface, space, nodes, graph, options, u, v):
 
 @kernel
 def relax_around_start(surface, space, nodes, graph, options, start):
-    """Relax the edges of the start: to the nodes that it is joined to."""
+    """Relax the edges from the start to the nodes that it is joined to."""
     box = nodes.joins[0]
     for row in range(box[2], box[3] + 1):
         for column in range(box[0], box[1] + 1):
@@ -197,7 +197,7 @@ def relax_around_start(surface, space, nodes, graph, options, start):
 
 @kernel
 def relax_around_node(surface, space, nodes, graph, options, u, goal):
-    """Relax the edges of a node: to its neighbours, and to the goal where it is joined to it."""
+    """Relax the edges from a node to its neighbours, and to the goal where the two are joined."""
     columns, rows = nodes.x.shape[0], nodes.y.shape[0]
     column, row = u % columns, u // columns
     for k in range(nodes.offsets.shape[0]):
@@ -211,7 +211,7 @@ def relax_around_node(surface, space, nodes, graph, options, u, goal):
 
 @kernel
 def search(surface, space, nodes, graph, options, most):
-    """Settle up to ``most`` vertices; end early where the goal is, or nothing is left."""
+    """Settle up to ``most`` vertices; stop early when the goal is settled or the heap is empty."""
     goal = graph.vertices.shape[0] - 1
     for _ in range(most):
         if graph.counters[OPEN] == 0 or graph.vertices[goal].slot == DONE:
@@ -227,7 +227,7 @@ def search(surface, space, nodes, graph, options, most):
 
 @kernel
 def begin(surface, graph, options, start_x, start_y, goal_x, goal_y):
-    """Open the start."""
+    """Place start and goal, and put the start into the heap."""
     goal = graph.vertices.shape[0] - 1
     place(surface, graph, goal, goal_x, goal_y)
     place(surface, graph, goal - 1, start_x, start_y)

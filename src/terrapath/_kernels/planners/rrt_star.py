@@ -1,11 +1,11 @@
 """The tree of RRT*-R: Algorithms 1 to 3 of the paper, with edges pruned by the chord.
 
 What the paper leaves open, and what is done here: Algorithm 3 as printed never updates
-Cost(v_new) after it changes v_min; that update is meant, and made. The goal joins the
-tree as a vertex as soon as one extension can reach it, and from then on is rewired like
-any other. An edge is as long as Line-R says but never shorter than its chord: both
-estimate its true length, and the chord is never above it. An informed tree tries the straight
-line to the goal first, and hangs new vertices below their parents' parents where that is shorter.
+Cost(v_new) after it changes v_min; the update is clearly meant, and is made here. The goal joins
+the tree as a vertex as soon as one extension can reach it, and is then rewired like any other
+vertex. The length of an edge is max(Line-R, chord): both estimate its true length, and the chord
+is never above it. An informed tree tries the straight line to the goal first. Where that is
+shorter, it joins a new vertex to its parent's parent.
 """
 
 import math
@@ -73,7 +73,7 @@ SIDE = 0.35
 
 @inner_kernel
 def nearest_of(tree, count):
-    """The place among the candidates of the nearest vertex, the first of several."""
+    """The index of the nearest candidate; of several, the vertex with the lowest number."""
     best = 0
     for k in range(1, count):
         squared, least = tree.near[k].squared, tree.near[best].squared
@@ -97,10 +97,11 @@ def steer(tree, options, x, y):
 
 @kernel
 def find_near(tree, options, radius, x, y):
-    """Collect the vertices near the new point; return where it lies, their count, the nearest.
+    """Collect the candidates near the new point; return its x and y, their count, the nearest.
 
-    Where there are any within the radius, which is at most a step, the nearest is one of
-    them. Elsewhere the tree is steered from the nearest vertex, which is always a candidate.
+    Where vertices are within the radius, which is at most a step, the nearest is one of them.
+    Otherwise the new point is steered towards from the nearest vertex of the tree, which then is
+    always a candidate.
     """
     count = within(tree.buckets, tree.places, x, y, radius, tree.near)
     if count > 0:
@@ -117,9 +118,9 @@ def find_near(tree, options, radius, x, y):
 
 @inner_kernel
 def measure_chord(tree, new, k):
-    """Write down the k-th candidate's chord and cost; return their sum.
+    """Store the k-th candidate's chord and cost; return their sum.
 
-    No path through it to the new vertex is shorter.
+    No path through it to the new vertex is shorter than this sum.
     """
     candidate = tree.near[k]
     rise = squared_rise(tree, new, candidate.vertex)
@@ -132,7 +133,7 @@ def measure_chord(tree, new, k):
 
 @kernel
 def measure_chords(tree, new, count):
-    """Write down the candidates' chords and costs; return the most promising one.
+    """Store the candidates' chords and costs; return the most promising candidate.
 
     That is the one whose cost plus chord is least.
     """
@@ -147,13 +148,13 @@ def measure_chords(tree, new, count):
 
 @kernel
 def choose_parent(surface, space, tree, options, new, count, promising):
-    """Hang the new vertex below the candidate through which it is cheapest to reach.
+    """Make the candidate through which the new vertex is cheapest to reach its parent.
 
     False where no candidate's length is finite, as on ground too steep for floating point.
 
-    The most promising candidate is tried first. An edge whose cost-to-come plus chord
-    cannot win is never integrated, and since no edge is shorter than its chord, that
-    changes nothing but the time taken.
+    The most promising candidate is tried first. An edge is measured only where the candidate's
+    cost plus the chord is less than the best cost so far. No edge is shorter than its chord, so
+    this changes nothing but the time taken.
     """
     best, pruned = -1, 0
     least = math.inf
@@ -177,7 +178,7 @@ def choose_parent(surface, space, tree, options, new, count, promising):
 
 @kernel
 def is_shorter(surface, space, tree, options, new, ancestor, spare):
-    """Is the new vertex cheaper to reach straight from an ancestor, at most a step away?"""
+    """Is the new vertex cheaper to reach directly from an ancestor, at most a step away?"""
     candidate, p = tree.near[spare], tree.places[new]
     candidate.vertex = ancestor
     candidate.squared = squared_distance(tree.places, ancestor, p[X], p[Y])
@@ -194,10 +195,10 @@ def is_shorter(surface, space, tree, options, new, ancestor, spare):
 
 @kernel
 def skip_parents(surface, space, tree, options, new, spare):
-    """Hang the new vertex below its parent's parent, and so on, as long as that is shorter.
+    """Make the parent's parent the new vertex's parent, and so on, as long as that is shorter.
 
-    So paths have few bends already where the tree is thin (Jeong, Lee and Kim 2019).
-    spare : a place among the candidates that none takes.
+    So paths have few bends even where the tree has few vertices (Jeong, Lee and Kim 2019).
+    spare : the index of an unused candidate, for workspace.
     """
     ancestor = tree.links[tree.links[new].parent].parent
     while ancestor >= 0 and is_shorter(surface, space, tree, options, new, ancestor, spare):
@@ -208,11 +209,11 @@ def skip_parents(surface, space, tree, options, new, spare):
 
 @kernel
 def rewire(surface, space, tree, options, new, count):
-    """Hang candidates below the new vertex where that shortens the path to them.
+    """Make the new vertex the parent of candidates where that shortens the path to them.
 
     Costs are compared as they were before this extension, Cost in the graph G of Algorithm 3.
-    Rewiring one candidate can shorten the path to another. That is left out, for otherwise the
-    tree would depend on the order in which candidates are visited.
+    Rewiring one candidate can shorten the path to another. That is ignored; otherwise the tree
+    would depend on the order in which candidates are visited.
     """
     come, parent = tree.places[new, COST], tree.links[new].parent
     rewired, pruned = 0, 0
@@ -236,7 +237,7 @@ def rewire(surface, space, tree, options, new, count):
 
 @kernel
 def refresh_buckets(tree, options, radius):
-    """Lay buckets and vertices out anew each time the tree has grown by half."""
+    """Sort the vertices into new buckets each time the tree has grown by half."""
     count = tree.counters[VERTICES]
     if 2 * count >= 3 * tree.counters[LAID_OUT]:
         width, height = options.x1 - options.x0, options.y1 - options.y0
@@ -272,7 +273,7 @@ def extend(surface, space, tree, options, x, y):
 
 @kernel
 def join_goal(surface, space, tree, options):
-    """Make the goal a vertex where the newest vertex is one step away from it, or is it."""
+    """Make the goal a vertex where the newest vertex is at most one step away from it."""
     newest = tree.counters[VERTICES] - 1
     if 0.0 < distance_to_goal(tree, options, newest) <= options.step:
         extend(surface, space, tree, options, options.goal_x, options.goal_y)
@@ -285,7 +286,7 @@ def join_goal(surface, space, tree, options):
 def grow(surface, space, tree, options, draws):
     """Algorithm 2: draw len(draws) samples. draws (m, 3): uniform numbers in [0, 1).
 
-    The first call plants the tree.
+    The first call makes the start the tree's first vertex.
     """
     if tree.counters[VERTICES] == 0:
         plant(surface, tree, options)

@@ -7,8 +7,8 @@ from ..surface.surfaces import spot_at, value_at
 from .buckets import squared_distance
 from .tree import COST, GOAL, LIFTED, STRAIGHT, VERTICES, X, Y
 
-# Share of the samples of an informed tree that are drawn beside the best path. With half of
-# them the tree is too thin elsewhere, and too often keeps to the valley that it found first.
+# Share of the samples of an informed tree that are drawn near the best path. With half of them
+# the tree has too few vertices elsewhere, and too often keeps to the first valley it found.
 PATH_SHARE = 0.3
 
 
@@ -22,10 +22,10 @@ def distance_to_goal(tree, options, vertex):
 
 @inner_kernel
 def area_to_search(tree, options):
-    """The bounds' area, or that of the ellipse which holds all better paths if it is smaller.
+    """The area of the bounds, or of the ellipse that holds all better paths if that is less.
 
-    A path of length c stays where the planar distances to start and goal, which are at
-    most the chords, sum to at most c over the least cost.
+    A path of length c stays where the planar distances to start and goal sum to at most c over
+    the least cost, because no chord is shorter than its planar distance.
     """
     area = (options.x1 - options.x0) * (options.y1 - options.y0)
     if options.informed and tree.counters[GOAL] >= 0:
@@ -45,13 +45,13 @@ def near_radius(tree, options):
 
 @inner_kernel
 def is_within_bounds(options, x, y):
-    """Is (x, y) in the region? Not where it is no number."""
+    """Is (x, y) within the bounds? False where x or y is NaN."""
     return options.x0 <= x <= options.x1 and options.y0 <= y <= options.y1
 
 
 @kernel
 def can_improve(surface, tree, x, y):
-    """Could a path through (x, y) beat the best one? By the chords to its ends, in R^n."""
+    """Can a path through (x, y) be shorter than the best one, by the chords to start and goal?"""
     goal = tree.counters[GOAL]
     from_start = squared_distance(tree.places, 0, x, y)
     to_goal = squared_distance(tree.places, goal, x, y)
@@ -83,10 +83,10 @@ def point_of_ellipse(tree, options, u, v):
 
 @inner_kernel
 def point_by_path(tree, options, share, offset):
-    """A point beside where the best path has run that share of its length, straight across it.
+    """A point near the best path, at right angles to it, after that share of its length.
 
-    It is at most a near radius away, for an offset from -1 to 1, with distances spread over
-    all scales: half of them are less than a 32nd of the radius.
+    For an offset from -1 to 1 it is at most a near radius away. Its distances are of all scales:
+    half of them are less than a 32nd of the radius.
     """
     vertex = tree.counters[GOAL]
     run = share * tree.places[vertex, COST]
@@ -103,14 +103,14 @@ def point_by_path(tree, options, share, offset):
 
 @kernel
 def sample(surface, tree, options, draw):
-    """A point to extend towards, and whether it is worth it.
+    """A point to extend towards, and whether it can improve the path.
 
-    draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share
-    ``goal_bias`` of the samples is the goal, and of an informed tree as many of the first as
-    bring it straight towards the goal. From then on, informed samples come from beside
-    the best path (Akgun and Stilman 2011), a share of them, and from the ellipse that holds
-    all better ones; those that the chord rules out are dropped (Gammell, Srinivasa and
-    Barfoot 2014, with the chord in place of the distance).
+    draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share ``goal_bias``
+    of the samples is the goal; an informed tree begins with the goal alone, as long as it grows
+    straight towards it. After that, a share of the informed samples is drawn near the best path
+    (Akgun and Stilman 2011), and the others in the ellipse that holds all better paths. Samples
+    that the chord rules out are dropped (Gammell, Srinivasa and Barfoot 2014, with the chord in
+    place of the distance).
     """
     width, height = options.x1 - options.x0, options.y1 - options.y0
     x, y = options.x0 + draw[1] * width, options.y0 + draw[2] * height

@@ -20,26 +20,26 @@ PRUNED = 4  # edges that the chord ruled out
 INTEGRATED = 5  # edges measured by Line-R
 CHECKED = 6  # edges tested against obstacles
 REWIRED = 7  # edges replaced by a better one
-LAID_OUT = 8  # vertices when the buckets were last laid out
+LAID_OUT = 8  # vertices when they were last sorted into the buckets
 STRAIGHT = 9  # 1 as long as the tree is growing straight from the start to the goal
 COUNTERS = 10
 
 
-# Entries of a row of Tree.places: all that the search for neighbours reads of a vertex.
+# Entries of a row of Tree.places: what the search for neighbours reads of a vertex.
 X, Y = 0, 1
 COST = 2  # length from the start
 LIFTED = 3  # the first of the weighted layer values
 
-# The metric tensor at a vertex: what is read of it where an edge is measured.
+# The metric tensor at a vertex: what measuring an edge reads of it.
 TENSOR = record(*((name, np.float64) for name in ("h11", "h12", "h22")))
 
-# How a vertex hangs in the tree. Costs are passed on over many, so they lie close together.
+# A vertex's links to others. A new cost is passed on through many, so they are small records.
 LINK = record(
     ("edge", np.float64),  # length of the edge from the parent
     ("parent", np.int32),  # -1 at the start
     ("child", np.int32),  # first child, -1 where none
     ("sibling", np.int32),  # next child of the same parent
-    ("age", np.int32),  # how many vertices there were before it
+    ("age", np.int32),  # how many vertices were in the tree before it
 )
 
 # A candidate edge between the newest vertex and one near it.
@@ -56,7 +56,7 @@ CANDIDATE = record(
 class Tree(NamedTuple):
     """The tree and its workspace; all arrays are filled in place.
 
-    Vertices are numbered anew each time the buckets are laid out, but the start is always 0.
+    Vertices get new numbers each time they are sorted into the buckets, but the start is always 0.
     """
 
     places: np.ndarray  # (n, LIFTED + layers) float64: rows of X, Y, COST and LIFTED
@@ -70,7 +70,7 @@ class Tree(NamedTuple):
 
 
 class Options(NamedTuple):
-    """What the planner was asked for."""
+    """The planner's options."""
 
     x0: float  # bounds
     y0: float
@@ -83,7 +83,7 @@ class Options(NamedTuple):
     step: float
     radius: float  # the near radius is radius * sqrt(area * log(n) / n), at most the step
     goal_bias: float
-    panel: float  # longest stretch that one application of the rule measures
+    panel: float  # longest piece that one application of Line-R measures
     riemannian: bool  # edges measured by Line-R; otherwise by the chord
     prune: bool
     informed: bool
@@ -99,7 +99,7 @@ def chord_between(graph, a, b):
 
 @inner_kernel
 def squared_rise(graph, a, b):
-    """How far the layers rise between two vertices, squared and summed."""
+    """The sum of the squared differences of the weighted layers between two vertices."""
     total = 0.0
     for entry in range(LIFTED, graph.places.shape[1]):
         rise = graph.places[a, entry] - graph.places[b, entry]
@@ -109,7 +109,7 @@ def squared_rise(graph, a, b):
 
 @inner_kernel
 def survey(surface, graph, new, x, y):
-    """Write a vertex's position and the surface above it; any graph's with ``places``."""
+    """Write a vertex's position, weighted layers and metric, in any graph with ``places``."""
     place, vertex = graph.places[new], graph.vertices[new]
     place[X], place[Y] = x, y
     spot, h = spot_at(surface, x, y), Metric(1.0, 0.0, 1.0)
@@ -136,7 +136,7 @@ def edge_length(surface, graph, a, b, panel):
 
 @kernel
 def place(surface, tree, new, x, y):
-    """Write a vertex's position and what is cached with it; it is not yet in the tree."""
+    """Write what is stored of a vertex's position; it is not in the tree yet."""
     survey(surface, tree, new, x, y)
     tree.links[new].child = -1
     tree.links[new].age = new
@@ -160,7 +160,7 @@ def plant(surface, tree, options):
 
 @kernel
 def adopt(tree, parent, child, edge):
-    """Hang a vertex below a parent."""
+    """Make a vertex the child of a parent."""
     link = tree.links[child]
     link.parent = parent
     link.edge = edge
@@ -184,10 +184,10 @@ def release(links, child):
 
 @kernel
 def pass_on_cost(tree, count):
-    """Recompute the cost of everything below the first vertices of ``Tree.queue``.
+    """Recompute the costs of all descendants of the first vertices of ``Tree.queue``.
 
-    In a queue: vertices that follow each other hang on different ones, and the processor
-    fetches several at once. From a stack each would be waited for.
+    In a queue, vertices that follow one another have different parents, so the processor can
+    fetch several at once. With a stack it would wait for each.
     """
     done = 0
     while done < count:
@@ -202,8 +202,8 @@ def pass_on_cost(tree, count):
             child = tree.links[child].sibling
 
 
-# Vertices that lie near one another are read together. In the order of their age they would be
-# spread over the memory, and most of the time would be spent on waiting for it.
+# Vertices near one another are read together. Sorted by age they would be far apart in memory,
+# and most of the time would be spent on waiting for it.
 
 
 @inner_kernel
@@ -231,7 +231,7 @@ def swap(tree, p, q, spare):
 
 @kernel
 def renumber(tree, count, numbers):
-    """Give each of the first vertices its number in ``numbers`` (count,), which is used up."""
+    """Give each of the first vertices its number in ``numbers`` (count,), which is overwritten."""
     for p in range(count):
         link = tree.links[p]
         link.parent = renamed(numbers, link.parent)
