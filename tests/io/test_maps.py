@@ -65,7 +65,7 @@ def _georeference(crs):
 
 
 def test_a_netcdf_file_that_does_not_say_where_its_cells_lie_is_refused(tmp_path):
-    as_dataarray(HEIGHTS, NORTH_UP, UTM).to_netcdf(tmp_path / "dem.nc")
+    as_dataarray(HEIGHTS, NORTH_UP, UTM).to_netcdf(tmp_path / "dem.nc", engine="h5netcdf")
     with pytest.raises(tp.MapError, match="xarray") as caught:
         tp.read_surface(tmp_path / "dem.nc")
     one_line(caught)

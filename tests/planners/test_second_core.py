@@ -242,7 +242,8 @@ def test_what_it_compiled_is_found_in_the_cache(tmp_path):
     assert first.wait() == 0
     first.stdout.close()
     code = (
-        "from terrapath.planners import warmup; from terrapath._kernels.compiler import cache_statistics\n"
+        "from terrapath.planners import warmup\n"
+        "from terrapath._kernels.compiler import cache_statistics\n"
         "warmup._prove(warmup.peaks()); print(cache_statistics()['compiled'])"
     )
     done = subprocess.run(
