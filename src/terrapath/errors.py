@@ -51,7 +51,7 @@ class CertificateError(TerrapathError):
 
 
 class TerrapathWarning(UserWarning):
-    """Base of every warning that Terrapath gives on purpose. The command line prints it on one line."""
+    """Base of every warning that Terrapath gives on purpose. The command line prints one line."""
 
 
 class KernelWarning(TerrapathWarning, RuntimeWarning):
