@@ -61,7 +61,7 @@ def square(count):
 
 
 def resealed(made, **changes):
-    """A certificate changed by one who knows how to seal it: mathematics alone rejects it."""
+    """A changed certificate with a correct seal, so that only the mathematics can reject it."""
     changed = replace(made, **changes)
     return replace(changed, seal=seal_of(changed))
 

@@ -1,4 +1,4 @@
-"""Commands to run, and what they must say."""
+"""Runs commands, and checks what they print."""
 
 import json
 
@@ -20,7 +20,7 @@ def json_of(capsys, *arguments):
 
 
 def refused(capsys, command, arguments, *words):
-    """Run, and see one line on standard error that holds all the words."""
+    """Run a command, and require one line on standard error that contains all the words."""
     assert run([command, *arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""

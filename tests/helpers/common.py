@@ -1,4 +1,4 @@
-"""What tests of several subjects share: places, numbers and points to draw, messages to look at."""
+"""Shared by tests of several packages: places of data, random numbers and points, messages."""
 
 from pathlib import Path
 
@@ -27,12 +27,12 @@ def mostly_slow(parameters, quick=1):
 
 
 def points_in(bounds, count, seed=0):
-    """(count, 2): places in a box, the same for the same seed."""
+    """(count, 2): random points in a box, the same for the same seed."""
     return np.random.default_rng(seed).uniform(bounds[:2], bounds[2:], (count, 2))
 
 
 def one_line(caught):
-    """The message of an error, which is one line."""
+    """The message of an error, checked to be one line."""
     text = str(caught.value)
     assert text
     assert "\n" not in text

@@ -1,4 +1,4 @@
-"""Reads thousands of damaged rasters, and prints what became of them as JSON."""
+"""Reads thousands of damaged rasters, and prints the outcomes as JSON."""
 
 import json
 import random
@@ -75,7 +75,7 @@ FILES = {
 
 
 def mutated(content, dice):
-    """Bytes flipped, cut off, repeated, dropped; numbers of text made absurd."""
+    """The damaged file: bytes flipped, cut off, repeated or dropped; numbers in text absurd."""
     data = bytearray(content)
     kind = dice.randrange(6)
     if kind == 0:

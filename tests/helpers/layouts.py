@@ -1,4 +1,4 @@
-"""Obstacles that paths on flat ground have to find their way around."""
+"""Obstacles on flat ground that paths must go around."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Slow, obvious answers that the fast kernels are held against."""
+"""Slow, obvious results that the fast kernels are compared with."""
 
 from __future__ import annotations
 

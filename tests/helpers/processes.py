@@ -12,7 +12,7 @@ PATH = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])
 
 
 def in_another_process(code, **environment):
-    """What a program that may import the helpers prints last, as JSON."""
+    """Run a program that may import the helpers; returns the JSON of its last line of output."""
     done = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "PYTHONPATH": PATH, **environment},

@@ -1,4 +1,4 @@
-"""What is worked out here and again in another process, to be compared bit by bit."""
+"""Results that are computed here and again in another process, to be compared bit by bit."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""A smooth terrain that is known exactly, sampled in any CRS and handed over in any form."""
+"""A smooth terrain that is known exactly, sampled in any CRS, as any kind of source."""
 
 import numpy as np
 import xarray
@@ -50,7 +50,7 @@ def as_dataarray(heights, transform, crs, **attributes):
 
 
 def netcdf(path, array):
-    """As CF asks: the CRS by its name, the axes by theirs."""
+    """Described as CF requires: the CRS by its name, the axes by their standard names."""
     for axis in ("x", "y"):
         array[axis].attrs.update(standard_name=f"projection_{axis}_coordinate", units="m")
     dataset = array if isinstance(array, xarray.Dataset) else array.to_dataset(name="elevation")

@@ -404,7 +404,7 @@ def test_what_is_no_bag_is_not_replaced(tmp_path):
     assert [path.name for path in target.iterdir()] == ["thesis.tex"]
     other = tmp_path / "file.bag2"
     other.write_text("a file")
-    with pytest.raises(tp.MapError, match="no folder"):
+    with pytest.raises(tp.MapError, match="not a folder"):
         tp.write_route(route_on("utm"), other)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file.bag2", "route.bag2"]
 

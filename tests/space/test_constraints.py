@@ -493,7 +493,7 @@ def test_maps_explain_what_the_radius_adds_and_what_is_too_steep():
     axes = Figure().add_subplot()
     draw_map(axes, tp.plan(problem, "fast-marching"))
     shown = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert shown[:3] == ["radius 0.25", "outside keep-in", "steeper than 30°"]
+    assert shown[:3] == ["radius 0.25", "outside the keep-in area", "steeper than 30°"]
     tones = [c for c in axes.collections if np.allclose(c.get_facecolor()[:1], [MARGIN_COLOUR])]
     drawn = shapely.union_all([shapely.Polygon(path.vertices) for path in tones[0].get_paths()[:]])
     assert shapely.covers(drawn, shapely.Point(8, 4).buffer(0.7))

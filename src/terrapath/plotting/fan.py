@@ -86,7 +86,7 @@ def draw_movement(axes: Any, angles: Array, movement: Array, length: float, exac
     axes.semilogy(degrees, movement, label="movement of the end", **style)
     axes.axhline(length, color=RAY_COLOUR, ls="--", lw=1.2, label="on flat ground")
     hits = np.degrees(exact[(exact >= angles[0]) & (exact <= angles[-1])])
-    style = {"ms": 9, "color": NEAR_COLOUR, "label": "directions that reach the goal"}
+    style = {"ms": 9, "color": NEAR_COLOUR, "label": "directions that hit the goal"}
     axes.plot(hits, np.full(len(hits), 0.02), "|", transform=axes.get_xaxis_transform(), **style)
     axes.axvline(
         np.degrees(exact[0]), color=PATH_COLOUR, lw=1.4, label="direction of the shortest path"

@@ -41,7 +41,7 @@ def draw_orders(axes: Any, scales: Sequence[float], errors: Array, name: str) ->
     axes.loglog(scales, np.abs(errors), "o-", lw=1.6, ms=5, label=name)
     axes.set(
         xlabel="scale of the smoothing (map units)",
-        ylabel="relative error of the length, without its sign",
+        ylabel="relative error of the length (absolute value)",
     )
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=9)
