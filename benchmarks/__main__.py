@@ -21,8 +21,8 @@ def benchmark_command(
         list[str] | None,
         typer.Argument(
             metavar="[WHAT]...",
-            help="Some of bound, fast-marching, path, large-maps, startup, trees, grids, growth "
-            "and edges.",
+            help="Any of bound, fast-marching, path, large-maps, startup, trees, grids, growth "
+            "and edges [default: all].",
         ),
     ] = None,
     quick: Annotated[
@@ -34,10 +34,10 @@ def benchmark_command(
     ] = Path("benchmark"),
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
 ) -> int:
-    """Measure bounds, paths, trees, lattices, large maps, start-up: clock, truth and peers.
+    """Measure Terrapath against the clock, true lengths, and other programs (peers).
 
-    Peers that are not installed are named and left out. A run that was stopped goes on where
-    it was when the same command is given again. Nothing else should run on the machine.
+    Peers that are not installed are named and left out. A run that was stopped continues when
+    the same command is given again. Nothing else should run on the machine.
     Exit codes: 0 done, whatever was measured, 2 bad input, 130 interrupted.
     """
 

@@ -13,7 +13,7 @@ from terrapath.paper.trials import Trial
 from .settings import Scale, true_length
 from .timing import Reading, Stopwatch, Target, Timing, percent, timed
 
-# The length that is told to the search: the true one, and not less.
+# The length that the search is given is the true length, times this: it must not be less.
 KNOWN = 1.0 + 1e-9
 
 # Gaps, and the seconds in which they are to be proven.
@@ -29,13 +29,13 @@ class BoundRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return "bound"
 
 
 @dataclass(frozen=True)
 class ProvenStep:
-    """The best certificate after one more lattice."""
+    """The best certificate after one more lattice, and the time until then."""
 
     nodes: int  # of the certificate's lattice
     gap: float
@@ -45,7 +45,7 @@ class ProvenStep:
 
 @dataclass(frozen=True)
 class BoundFound:
-    """What the search for a bound found."""
+    """The result of the search for a lower bound."""
 
     steps: tuple[ProvenStep, ...]
 
@@ -56,12 +56,12 @@ class BoundFound:
 
 @dataclass(frozen=True)
 class BoundTrial(Trial[BoundFound]):
-    """Lower bounds on one scene's length."""
+    """The search for a lower bound on one scene."""
 
     planner: BoundRuns
 
     def measure(self) -> BoundFound:
-        """Search, warm, as often as the settings say: the certificates are the same each time."""
+        """Search as often as the settings say. The certificates are the same each time."""
         lower_bound(self.problem, length=self._length).check(self.problem)
         runs = [self._search() for _ in range(self.planner.repeats)]
         return BoundFound(tuple(map(self._step, zip(*runs, strict=True))))
@@ -71,7 +71,7 @@ class BoundTrial(Trial[BoundFound]):
         return true_length(self.scene) * KNOWN
 
     def _search(self) -> list[tuple[Certificate, Reading]]:
-        """Each certificate with the time when it was there."""
+        """Each certificate, with the time at which it was found."""
         problem, found = self.problem, []
 
         def see(certificate: Certificate) -> None:
@@ -81,19 +81,19 @@ class BoundTrial(Trial[BoundFound]):
         gap = self.planner.target_gap
         last = lower_bound(problem, length=self._length, target_gap=gap, watch=see)
         reading = watch.read()
-        # The one that ends the search is only returned.
+        # The last certificate is returned, but not passed to ``see``.
         if not found or last.value > found[-1][0].value:
             found.append((last, reading))
         return found
 
-    def _step(self, seen: tuple[tuple[Certificate, Reading], ...]) -> ProvenStep:
-        certificate, problem = seen[0][0], self.problem
-        checks = [timed(partial(found.check, problem))[1] for found, _ in seen]
+    def _step(self, repeated: tuple[tuple[Certificate, Reading], ...]) -> ProvenStep:
+        certificate, problem = repeated[0][0], self.problem
+        checks = [timed(partial(again.check, problem))[1] for again, _ in repeated]
         lattice = certificate.lattice
         return ProvenStep(
             lattice.nx * lattice.ny,
             self._length / certificate.value - 1.0,
-            Timing.of(reading for _, reading in seen),
+            Timing.of(reading for _, reading in repeated),
             Timing.of(checks),
         )
 
@@ -102,14 +102,14 @@ BoundData = dict[str, BoundFound]
 
 
 def run_bound(scale: Scale, runner: Runner) -> BoundData:
-    """For each scene the certificates of ever finer lattices."""
+    """For each scene, the certificates of ever finer lattices."""
     runs = BoundRuns(target_gap=scale.target_gap, repeats=scale.bound_repeats)
     found = runner.run("bound", [BoundTrial(scene, runs) for scene in scale.scenes])
     return dict(zip(scale.scenes, found, strict=True))
 
 
 def bound_targets(data: BoundData) -> list[Target]:
-    """Two gaps on every scene."""
+    """The seconds until two gaps, on every scene."""
     targets = []
     for scene, found in data.items():
         for gap, limit in GAP_TARGETS:

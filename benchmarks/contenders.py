@@ -1,4 +1,4 @@
-"""Who takes part when trees are compared, and which of their options are tried."""
+"""The planners whose trees are compared, and which of their options are tried."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Options = tuple[tuple[str, Any], ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Contender:
-    """A planner, and the options of which the best are taken."""
+    """A planner, and the choices of options, of which the best is taken."""
 
     label: str
     program: str
     planner: str
     choices: tuple[Options, ...]
-    as_of: str = ""  # label of the contender whose best options are taken in their place
-    late: bool = False  # best are those with the shortest path in the end, not those near it first
-    few: bool = False  # seeds
+    as_of: str = ""  # label of another contender, whose best options are taken instead
+    late: bool = False  # ranked by the path in the end, not by the time until it is near
+    few: bool = False  # runs with fewer seeds
 
 
 def _own_choices(side: float, *, informed: bool) -> tuple[Options, ...]:
@@ -32,7 +32,7 @@ def _own_choices(side: float, *, informed: bool) -> tuple[Options, ...]:
 
 
 def _ompl_choices(side: float) -> tuple[Options, ...]:
-    """All near vertices, or as many as theory asks for, or half as many; one or two steps."""
+    """All near vertices, or as many as theory asks for, or half as many; with one or two steps."""
     near: tuple[Options, ...] = (
         (("use_k_nearest", 1), ("rewire_factor", 1.1)),
         (("use_k_nearest", 1), ("rewire_factor", 1.0 / 8.0)),
@@ -43,8 +43,8 @@ def _ompl_choices(side: float) -> tuple[Options, ...]:
     )
 
 
-# What OMPL's Informed RRT* does not switch on, and is the faster for: vertices that cannot improve
-# the path by the tree's own costs are turned away.
+# OMPL's Informed RRT* does not switch this on, but it is faster with it: vertices that cannot
+# improve the path, by the tree's own costs, are rejected.
 _REJECTING: Options = (
     ("informed_sampling", 1),
     ("new_state_rejection", 1),
@@ -63,7 +63,7 @@ CPP_RRT, PYTHON_RRT = "OMPL RRT\\* in C++", "OMPL RRT\\* through Python"
 
 
 def in_the_end(label: str) -> str:
-    """The contender with the options that are best in the end."""
+    """The label of the contender with the options that are best in the end."""
     return f"{label}, best in the end"
 
 
@@ -100,7 +100,7 @@ def contenders(side: float) -> list[Contender]:
             "RRT\\*, informed and rejecting": ("rrt-star", rejecting),
         }.items()
     ]
-    # Not PRM*: its second thread waits for the interpreter, and it for the thread (OMPL 2.0).
+    # Not PRM*: it and its second thread wait for each other for ever (OMPL 2.0).
     python = [
         Contender(
             label=f"OMPL {label} through Python",

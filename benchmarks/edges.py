@@ -1,4 +1,4 @@
-"""Nanoseconds of an edge by Line-R, beside a loop in C++."""
+"""The time to measure an edge by Line-R, beside a loop in C++."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .programs import EDGES_LOOP
 from .settings import Scale
 from .timing import Reading, Target, Timing, timed
 
-SPLINE_TARGET = 150.0  # nanoseconds an edge
+SPLINE_TARGET = 150.0  # nanoseconds for an edge
 PEAKS_TARGET = 1.0  # times the seconds of the loop in C++
 
 SAMPLES = 121  # on a side, of the spline
@@ -31,7 +31,7 @@ LONGEST = 1.0  # edge, map units
 
 @cache
 def ground(kind: str) -> Problem:
-    """Six-peaks, by its exact peaks or by a spline through samples of both layers."""
+    """Six-peaks, with its exact peaks or with a spline through samples of both layers."""
     exact = scenes.load("six-peaks")
     if kind == "peaks":
         return exact
@@ -43,7 +43,7 @@ def ground(kind: str) -> Problem:
 
 
 def random_edges(problem: Problem, count: int) -> Array:
-    """(count, 4): both ends, at most the longest edge apart, within the bounds."""
+    """(count, 4): the two ends of each edge, at most ``LONGEST`` apart, within the bounds."""
     random = np.random.default_rng(0)
     bounds = problem.bounds
     low, high = np.array(bounds[:2]), np.array(bounds[2:])
@@ -64,27 +64,27 @@ class EdgeRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return f"edges-{self.kind}"
 
 
 @dataclass(frozen=True)
 class EdgesFound:
-    """Seconds for all edges."""
+    """The seconds for all edges."""
 
     ours: Timing
     loop: Timing | None
-    difference: float | None  # the largest between both lengths of an edge, relative
+    difference: float | None  # largest relative difference of an edge's two lengths
 
 
 @dataclass(frozen=True)
 class EdgesTrial(Trial[EdgesFound]):
-    """One surface; both are run by turns."""
+    """One surface; Terrapath and the loop take turns."""
 
     planner: EdgeRuns
 
     def measure(self) -> EdgesFound:
-        """All edges, as often as told."""
+        """Measure all edges, as often as the settings say."""
         runs, problem = self.planner, ground(self.planner.kind)
         edges = random_edges(problem, runs.edges)
         start, end = np.ascontiguousarray(edges[:, :2]), np.ascontiguousarray(edges[:, 2:])
@@ -107,12 +107,12 @@ class EdgesTrial(Trial[EdgesFound]):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The edges are made of them alone."""
+        """The settings; the edges depend on nothing else."""
         return {"scene": self.scene, "options": asdict(self.planner)}
 
 
 def loop_lengths(problem: Problem, edges: Array) -> tuple[Reading, Array]:
-    """The loop in C++, its second time round, and the lengths (m,), map units."""
+    """The time of the loop in C++, run for the second time, and the lengths (m,), map units."""
     with tempfile.TemporaryDirectory() as folder:
         where = [Path(folder) / name for name in ("problem", "segments", "lengths")]
         write_problem(where[0], problem)
@@ -124,7 +124,7 @@ def loop_lengths(problem: Problem, edges: Array) -> tuple[Reading, Array]:
 
 @dataclass(frozen=True)
 class EdgesData:
-    """Both surfaces."""
+    """The measures on both surfaces."""
 
     found: dict[str, EdgesFound]  # by kind
     edges: int
@@ -132,12 +132,12 @@ class EdgesData:
     version: str | None  # of the loop in C++
 
     def nanoseconds(self, timing: Timing) -> float:
-        """For an edge."""
+        """Nanoseconds for one edge."""
         return 1e9 * timing.seconds / self.edges
 
 
 def run_edges(scale: Scale, runner: Runner) -> EdgesData:
-    """Spline and peaks."""
+    """Measure on a spline and on peaks."""
     version = EDGES_LOOP.version
     kinds = ("spline", "peaks")
     trials = [
@@ -153,7 +153,7 @@ def run_edges(scale: Scale, runner: Runner) -> EdgesData:
 
 
 def edges_targets(data: EdgesData) -> list[Target]:
-    """Of the spline, and of peaks beside the loop."""
+    """The time on the spline, and the ratio to the loop on peaks."""
     spline, peaks = data.found["spline"], data.found["peaks"]
     what = "an edge on a spline surface with two layers, in a batch"
     targets = [Target(what, SPLINE_TARGET, "ns", data.nanoseconds(spline.ours))]

@@ -1,4 +1,4 @@
-"""Problems as the programs in C++ read them: a file of 64-bit floats."""
+"""Problems in the format that the programs in C++ read: a file of 64-bit floats."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ PEAKS, SPLINE = 0.0, 1.0
 
 
 def panel_of(problem: Problem) -> float:
-    """The longest stretch that one application of Line-R measures in a tree, map units."""
+    """The longest piece that one application of Line-R measures in a tree, map units."""
     return FEATURES_PER_PANEL * problem.surface.resolution
 
 
 def _blocks(mask: Mask, bounds: Bounds) -> bool:
-    """Is a cell without data within the bounds, or at less than a cell from them?"""
+    """Is a cell without data within the bounds, or less than one cell away from them?"""
     dx, dy = mask.x[1] - mask.x[0], mask.y[1] - mask.y[0]
     columns = (mask.x > bounds.x1_min - dx) & (mask.x < bounds.x1_max + dx)
     rows = (mask.y > bounds.x2_min - dy) & (mask.y < bounds.x2_max + dy)
@@ -32,11 +32,11 @@ def _blocks(mask: Mask, bounds: Bounds) -> bool:
 
 
 def discs_of(problem: Problem) -> Array:
-    """The obstacles, (m, 3): centre and radius, map units. Raises InputError for all others."""
+    """Discs (m, 3): centre and radius, map units. Raises InputError for any other obstacle."""
     others = [o for o in problem.obstacles if not isinstance(o, Circle)]
     nodata = problem.surface.nodata is not None and _blocks(problem.surface.nodata, problem.bounds)
     if others or nodata or problem.max_slope is not None or problem.keep_in is not None:
-        raise InputError(f"{problem.name}: other programs are given no obstacles but discs")
+        raise InputError(f"{problem.name}: programs in C++ take no obstacles but discs")
     discs = [(o.x1, o.x2, o.radius + problem.radius) for o in problem.obstacles]  # type: ignore[union-attr]
     return np.array(discs, np.float64).reshape(-1, 3)
 
@@ -50,16 +50,16 @@ def _surface_parts(data: Peaks | Spline) -> Iterator[Array | list[float]]:
             yield data.peaks[first:end].ravel()
         return
     if len(data.log_cost) > 0:
-        raise InputError("programs in C++ know no cost layers")
+        raise InputError("programs in C++ take no cost layers")
     yield [SPLINE, *weights, *map(float, data.coefficients.shape[1:])]
     yield [data.x0, data.y0, data.dx, data.dy]
     yield data.coefficients.ravel()
 
 
 def write_problem(path: Path, problem: Problem) -> None:
-    """What ``Problem`` in ``benchmarks/surface.hpp`` reads.
+    """Write a file that ``Problem`` in ``benchmarks/cpp/surface.hpp`` reads.
 
-    Raises InputError where the problem has what the programs do not know.
+    Raises InputError where the problem has something that the programs do not support.
     """
     bounds, discs = problem.bounds, discs_of(problem)
     parts = [

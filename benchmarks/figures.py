@@ -16,29 +16,29 @@ from .timing import percent
 
 TARGET_COLOUR = "#e4002b"
 
-# Excesses below this are rounding.
+# Smaller excesses are rounding errors.
 LEAST_EXCESS = 1e-9
 
 
 def _plain_percent(share: float) -> str:
-    """As ``percent``, but small ones are written out."""
+    """Like ``percent``, but without an exponent for small shares."""
     return f"{np.format_float_positional(100.0 * share, 3, fractional=False, trim='-')} %"
 
 
 def label_percent(axis: Any) -> None:
-    """Ticks of an axis in percent."""
+    """Label the ticks of an axis in percent."""
     axis.set_major_formatter(lambda value, _: _plain_percent(value))
     axis.set_minor_formatter("")
 
 
 def label_plain(axis: Any) -> None:
-    """Ticks of an axis as plain numbers."""
+    """Label the ticks of an axis with plain numbers."""
     axis.set_major_formatter("{x:,.7g}")
     axis.set_minor_formatter("")
 
 
 def draw_bound(data: BoundData, directory: Path) -> list[Path]:
-    """Gap against seconds, a line a scene."""
+    """Gap against seconds, one line for each scene."""
     figure = new_figure(8.0, 5.4)
     axes = figure.subplots()
     for scene, found in data.items():
@@ -98,7 +98,7 @@ def _draw_errors(axes: Any, rows: dict[str, list[MarchRow]]) -> None:
 
 
 def draw_marching(data: MarchData, directory: Path) -> list[Path]:
-    """Seconds and errors against the nodes of a side."""
+    """Seconds and errors against the number of nodes on a side."""
     rows: dict[str, list[MarchRow]] = {}
     for row in data.rows:
         rows.setdefault(row.scene, []).append(row)
@@ -108,7 +108,7 @@ def draw_marching(data: MarchData, directory: Path) -> list[Path]:
     _draw_errors(right, rows)
     for axes in (left, right):
         axes.set_xlabel("nodes a side")
-        # 961 and 1,001 would lie on each other.
+        # The labels 961 and 1,001 would overlap.
         axes.set_xticks(sorted({row.nodes for row in data.rows} - {961}))
         label_plain(axes.xaxis)
         axes.grid(alpha=0.3, which="both")
@@ -119,7 +119,7 @@ def draw_marching(data: MarchData, directory: Path) -> list[Path]:
     return [path]
 
 
-# Marks and colours of planners, by how their labels begin.
+# Marks and colours of planners, by the beginnings of their labels.
 MARKS = {
     "fast marching, refined": ("*", "#2ca02c"),
     "fast marching": ("o", "#2ca02c"),
@@ -155,7 +155,7 @@ def _draw_planners(axes: Any, labels: list[str], found: list[PathsFound]) -> Non
 
 
 def _draw_tree_sizes(axes: Any, trees: list[tuple[str, PathsFound]]) -> None:
-    """One planner with several numbers of samples: one line, which the legend names once."""
+    """Draw one planner with several numbers of samples as one line, with one legend entry."""
     planner = trees[0][0].split(",")[0]
     *others, last = (name.removeprefix(f"{planner}, ") for name, _ in trees)
     listed = ", ".join(size.removesuffix(TREES_END) for size in others)
@@ -181,7 +181,7 @@ def _draw_targets(axes: Any, scene: str) -> None:
 
 
 def draw_paths(data: PathsData, directory: Path) -> list[Path]:
-    """Excess against seconds, a panel a scene, a mark a planner."""
+    """Excess against seconds, one panel for each scene, one mark for each planner."""
     columns = min(len(data.found), 3)
     rows = -(-len(data.found) // columns)
     figure = new_figure(4.4 * columns + 2.2, 3.7 * rows)

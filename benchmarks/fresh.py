@@ -1,4 +1,4 @@
-"""What is measured in a process that has done nothing before: ``python -m ... TASK``."""
+"""Fast marching, measured in a fresh process: ``python -m ... TASK``."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .peers import SCIKIT_FMM
 from .processes import answer
 from .timing import Reading, Timing, timed
 
-# Nodes on a side of the lattice that everything is compiled on.
+# Nodes on a side of the lattice on which everything runs once before it is measured.
 SMALL = 61
 
 
 class TimedMedium(Medium):
-    """A medium that tells how long its dependents took."""
+    """A medium that keeps how long its dependents took."""
 
     dependents_time: Reading
 
@@ -49,18 +49,18 @@ class Bench:
         return march_from(problem.surface, problem.free_space, problem.start, medium)
 
     def distance(self) -> float:
-        """From start to goal, map units."""
+        """The distance from start to goal, map units."""
         return float(self.march(self.medium()).at(self.problem.goal))
 
     def laps(self) -> list[Reading]:
-        """Stencils, dependents, march."""
+        """The times for stencils, for dependents and for the march."""
         medium, made = timed(self.medium)
         dependents = medium.dependents_time
         stencils = Reading(made.wall - dependents.wall, made.processor - dependents.processor)
         return [stencils, dependents, timed(lambda: self.march(medium))[1]]
 
     def peer_lap(self, skfmm: Any) -> Reading:
-        """The same lattice on flat ground, all speeds 1, second order."""
+        """The peer's time on the same lattice, on flat ground, all speeds 1, second order."""
         lattice, start = self.lattice, self.problem.start
         phi = np.ones((lattice.ny, lattice.nx))
         speed = np.ones_like(phi)
@@ -71,7 +71,7 @@ class Bench:
 
 
 def measure_marching(scene: str, runs: MarchRuns) -> Marched:
-    """Memory first, then seconds, ours and the peer's by turns."""
+    """Measure memory first, then seconds; Terrapath and the peer take turns."""
     problem = scenes.load(scene)
     Bench(problem, SMALL).distance()
     forget_peak()

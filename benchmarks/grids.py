@@ -21,7 +21,7 @@ from .processes import answer, run_fresh
 from .settings import Scale, true_length
 from .timing import Reading, Target, Timing, timed
 
-# Nodes on a side of what everything is done on once before.
+# Nodes on a side of the lattice on which everything runs once before it is measured.
 SMALL = 31
 
 
@@ -36,13 +36,13 @@ class GridRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return f"grid-{self.method}-{self.nodes}"
 
 
 @dataclass(frozen=True)
 class GridFound:
-    """What a fresh process measured."""
+    """The measures of a fresh process."""
 
     timing: Timing
     distance: float  # from start to goal, map units
@@ -55,14 +55,14 @@ class GridTrial(Trial[GridFound]):
     planner: GridRuns
 
     def measure(self) -> GridFound:
-        """Start the process and read what it prints."""
+        """Start the process and read its answer."""
         task = {"scene": self.scene, **asdict(self.planner)}
         what = f"{self.planner.method} on {self.planner.nodes:,} nodes a side"
         return self.decode(run_fresh("grids", task, what))
 
 
-# Methods: each takes the problem and a lattice, and returns what is timed, which in turn returns
-# the distance. Laying out a lattice or a mesh from the surface is part of what is timed.
+# Methods: each takes the problem and a lattice, and returns the distance. The time includes making
+# a lattice or a mesh from the surface.
 
 
 def _marching(problem: Problem, lattice: Lattice) -> float:
@@ -95,7 +95,7 @@ def _node_at(lattice: Lattice, point: tuple[float, float]) -> tuple[int, int]:
 
 
 def _least_cost(problem: Problem, lattice: Lattice) -> float:
-    """MCP_Geometric knows no direction: each cell costs the geometric mean of h's stretches."""
+    """MCP_Geometric has one cost for all directions: the geometric mean of how h stretches them."""
     from skimage.graph import MCP_Geometric
 
     costs = metric.determinant(problem.surface, _node_points(lattice)) ** 0.25
@@ -151,17 +151,17 @@ def _exact(problem: Problem, lattice: Lattice) -> float:
 
 @dataclass(frozen=True)
 class Method:
-    """How a distance is found."""
+    """A method that computes the distance."""
 
     label: str
     distance: Callable[[Problem, Lattice], float]  # map units
-    peer: Peer | None = None  # None where it is terrapath's own
-    slow: bool = False  # for coarse lattices alone
-    feature: str = ""  # of the peer's module, without which its version is too old
+    peer: Peer | None = None  # None for Terrapath's own methods
+    slow: bool = False  # run on coarse lattices only
+    feature: str = ""  # a name in the peer's module; without it the version is too old
 
     @property
     def is_there(self) -> bool:
-        """Can it be run?"""
+        """Is the peer installed, and new enough?"""
         module = None if self.peer is None else self.peer.load()
         return self.peer is None or (module is not None and hasattr(module, self.feature))
 
@@ -204,7 +204,7 @@ class GridRow:
 
     @property
     def error(self) -> float:
-        """Of the distance at the goal, relative."""
+        """The relative error of the distance at the goal."""
         return self.found.distance / true_length(self.scene) - 1.0
 
 
@@ -213,12 +213,12 @@ class GridsData:
     """All methods on all lattices."""
 
     rows: list[GridRow]
-    missing: list[str]  # what is said of peers that are
+    missing: list[str]  # a sentence for each peer that is missing
     versions: dict[str, str]
 
 
 def run_grids(scale: Scale, runner: Runner) -> GridsData:
-    """Each scene by each method on each lattice."""
+    """Measure each method on each scene and each lattice."""
     peers = {method.peer.name: method.peer for method in METHODS.values() if method.peer}
     versions = {name: peer.version for name, peer in peers.items()}
     trials = []
@@ -245,12 +245,12 @@ def run_grids(scale: Scale, runner: Runner) -> GridsData:
 
 
 def grids_targets(data: GridsData) -> list[Target]:
-    """None: these are shown."""
+    """None: there are no targets."""
     return []
 
 
 def measure_grid(scene: str, runs: GridRuns) -> GridFound:
-    """Once on a small lattice, so that all is loaded and compiled, then as often as told."""
+    """Run once on a small lattice, to load and compile everything; then measure."""
     problem, method = scenes.load(scene), METHODS[runs.method]
     method.distance(problem, Lattice(problem.bounds, SMALL, SMALL))
     lattice = Lattice(problem.bounds, runs.nodes, runs.nodes)

@@ -1,4 +1,4 @@
-"""How time and memory of RRT*-R grow with its samples."""
+"""How the time and the memory of RRT*-R grow with the number of samples."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from .processes import answer, run_fresh
 from .settings import Scale
 from .timing import Target, Timing, timed
 
-GROWTH_TARGET = 13.0  # times the seconds for ten times the samples
-BYTES_TARGET = 200.0  # a sample
-# On fewer samples the memory is that of other things.
+GROWTH_TARGET = 13.0  # ratio of the seconds, for ten times the samples
+BYTES_TARGET = 200.0  # for a sample
+# With fewer samples, most of the memory is used by other things.
 FEWEST_SAMPLES = 100_000
 
 
 def _four_layers() -> Problem:
-    """Height and resistance of repeat-4d with two more layers."""
+    """Height and resistance of repeat-4d, and two more layers."""
     layers = [
         scenes.REPEAT_HEIGHT,
         scenes.REPEAT_RESISTANCE,
@@ -50,34 +50,34 @@ class GrowthRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return f"growth-{self.samples}"
 
 
 @dataclass(frozen=True)
 class GrowthFound:
-    """What a fresh process measured."""
+    """The measures of a fresh process."""
 
     timing: Timing
     length: float | None  # map units; None where no path was found
     vertices: int
-    memory_before: int | None  # the process's, bytes; None where the system does not tell
+    memory_before: int | None  # the process's, bytes; None where the system gives none
     memory_peak: int | None
 
 
 @dataclass(frozen=True)
 class GrowthTrial(Trial[GrowthFound]):
-    """So many samples, in a process of its own."""
+    """One number of samples, in a process of its own."""
 
     planner: GrowthRuns
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The ground is made of its name alone."""
+        """The settings; the ground depends on its name alone."""
         return {"ground": self.scene, "options": asdict(self.planner)}
 
     def measure(self) -> GrowthFound:
-        """Start the process and read what it prints."""
+        """Start the process and read its answer."""
         task = {"scene": self.scene, **asdict(self.planner)}
         return self.decode(run_fresh("growth", task, f"{self.planner.samples:,} samples"))
 
@@ -92,7 +92,7 @@ class GrowthRow:
 
     @property
     def bytes_per_sample(self) -> float | None:
-        """Peak memory above what the process had before, where there are samples enough."""
+        """Peak memory above the memory before; None where there are too few samples."""
         before, peak = self.found.memory_before, self.found.memory_peak
         if before is None or peak is None or self.samples < FEWEST_SAMPLES:
             return None
@@ -101,13 +101,13 @@ class GrowthRow:
 
 @dataclass(frozen=True)
 class GrowthData:
-    """All grounds with all numbers of samples, fewest first."""
+    """All grounds with all numbers of samples, the fewest first."""
 
     rows: list[GrowthRow]
 
 
 def run_growth(scale: Scale, runner: Runner) -> GrowthData:
-    """Each ground with each number of samples."""
+    """Measure each ground with each number of samples."""
     trials = [
         GrowthTrial(ground, GrowthRuns(samples=samples, repeats=scale.growth_repeats))
         for ground in GROUND
@@ -119,7 +119,7 @@ def run_growth(scale: Scale, runner: Runner) -> GrowthData:
 
 
 def growth_targets(data: GrowthData) -> list[Target]:
-    """Of time for ten times the samples, of memory, and that a path is found."""
+    """The growth of time, the memory for a sample, and that a path is found."""
     targets = []
     for row in data.rows:
         tenth = (o for o in data.rows if (o.scene, 10 * o.samples) == (row.scene, row.samples))
@@ -143,7 +143,7 @@ def growth_targets(data: GrowthData) -> list[Target]:
 
 
 def measure_growth(scene: str, runs: GrowthRuns) -> GrowthFound:
-    """Memory of the first run, seconds of all; samples are drawn everywhere."""
+    """Measure the memory of the first run and the seconds of all; samples are drawn everywhere."""
     problem = GROUND[scene]()
 
     def grow(samples: int) -> Any:

@@ -1,4 +1,4 @@
-"""Maps of a hundred million cells: seconds and memory, coarse to fine."""
+"""Planning on maps of a hundred million cells, coarse to fine: seconds and memory."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from .processes import answer, run_fresh
 from .settings import Scale
 from .timing import Reading, Target, Timing, timed
 
-GIGABYTES_TARGET, TARGET_CELLS = 6.0, 10_000  # of a map with so many cells a side
+GIGABYTES_TARGET, TARGET_CELLS = 6.0, 10_000  # of a map with this many cells on a side
 
 CELL = 10.0  # metres
 ROWS_AT_ONCE = 500
-WAVES = 8  # whose lengths are 0.3 to 24 km
-NOISE = 0.3  # metres, of every cell
+WAVES = 8  # of lengths from 0.3 to 24 km
+NOISE = 0.3  # in every cell, metres
 STEEPEST = 30.0  # degrees
 
 
@@ -43,20 +43,20 @@ class LargeMapRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return f"large-map-{self.cells}"
 
 
 @dataclass(frozen=True)
 class LargeMapFound:
-    """What a fresh process measured, everything compiled before."""
+    """The measures of a fresh process, with everything compiled before."""
 
     timing: Timing
     length: float  # map units
     coarse_length: float
-    least_length: float  # of any path on the map
-    corridor_bound: float  # of any path in the corridor
-    memory_before: int | None  # the process's, bytes; None where the system does not tell
+    least_length: float  # lower bound for any path on the map
+    corridor_bound: float  # lower bound for any path in the corridor
+    memory_before: int | None  # the process's, bytes; None where the system gives none
     memory_peak: int | None
 
 
@@ -68,11 +68,11 @@ class LargeMapTrial(Trial[LargeMapFound]):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The map is made of them alone."""
+        """The settings; the map depends on nothing else."""
         return {"map": self.scene, "options": asdict(self.planner)}
 
     def measure(self) -> LargeMapFound:
-        """Write the map, start the process and read what it prints."""
+        """Write the map, start the process and read its answer."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "map.tif"
             write_map(path, self.planner.cells)
@@ -83,13 +83,13 @@ class LargeMapTrial(Trial[LargeMapFound]):
 
 @dataclass(frozen=True)
 class LargeMapData:
-    """All maps, with their cells a side."""
+    """All maps, by their cells on a side."""
 
     found: dict[int, LargeMapFound]
 
 
 def run_large_maps(scale: Scale, runner: Runner) -> LargeMapData:
-    """Each size."""
+    """Measure maps of each size."""
     trials = [LargeMapTrial("hills", LargeMapRuns(cells=cells)) for cells in scale.map_cells]
     found = runner.run("large maps", trials)
     return LargeMapData(dict(zip(scale.map_cells, found, strict=True)))
@@ -109,7 +109,7 @@ def large_maps_targets(data: LargeMapData) -> list[Target]:
 
 
 def write_map(path: Path, cells: int) -> None:
-    """Hills of all sizes with a lake in the middle, 32-bit metres in UTM; always the same."""
+    """Write a map of hills of all sizes and a lake, 32-bit metres in UTM; always the same one."""
     import rasterio
     from rasterio.transform import from_origin
 
@@ -145,7 +145,7 @@ def write_map(path: Path, cells: int) -> None:
 
 
 def measure_large_map(path: str, runs: LargeMapRuns) -> LargeMapFound:
-    """From corner to corner, on a map that is far larger than what was warmed up on."""
+    """Plan from corner to corner, after a warm-up on a far smaller map."""
     planner = make_finished(runs.planner, refine=True, bound=True)
 
     def pose(part: Part) -> tuple[Problem, Sequence[Any]]:
@@ -167,7 +167,7 @@ def measure_large_map(path: str, runs: LargeMapRuns) -> LargeMapFound:
     corridor = solution.corridor
     assert corridor is not None
     least = corridor.least_length(solution)
-    assert least is not None  # without costs
+    assert least is not None  # because the map has no costs
     return LargeMapFound(
         Timing.of([Reading(*reading)]),
         solution.length,

@@ -1,4 +1,4 @@
-"""Fast marching on h: seconds, memory and error against the number of nodes."""
+"""Fast marching under h: seconds, memory and error by the number of nodes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from .processes import run_fresh
 from .settings import Scale, true_length
 from .timing import Target, Timing
 
-# Seconds over scikit-fmm's on so many nodes a side; memory a node in bytes; the memory that a
-# lattice of so many nodes a side fits in.
+# The seconds over those of scikit-fmm, and the nodes on a side for that; the memory for a node,
+# bytes; the memory in all, and the nodes on a side for that.
 RATIO_TARGET, RATIO_NODES = 1.2, 1001
 BYTES_TARGET = 100.0
 GIGABYTES_TARGET, GIGABYTES_NODES = 8.0, 4001
 
-# On fewer nodes the memory is that of other things.
+# With fewer nodes, most of the memory is used by other things.
 FEWEST_NODES = 500_000
 
 # Relative error at the goal of HamiltonFastMarching (C++, github.com/Mirebeau/
@@ -41,30 +41,30 @@ class MarchRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return f"march-{self.nodes}"
 
 
 @dataclass(frozen=True)
 class Marched:
-    """What a fresh process measured."""
+    """The measures of a fresh process."""
 
     stencils: Timing
     dependents: Timing
     march: Timing
     peer: Timing | None  # scikit-fmm, isotropic, second order
     distance: float  # from start to goal, map units
-    memory_before: int | None  # the process's, bytes; None where the system does not tell
+    memory_before: int | None  # the process's, bytes; None where the system gives none
     memory_peak: int | None
 
     @property
     def whole(self) -> Timing:
-        """From the surface to the distance field."""
+        """The time from the surface to the distance field."""
         return self.stencils + self.dependents + self.march
 
     @property
     def ratio(self) -> float | None:
-        """Seconds over scikit-fmm's."""
+        """The seconds over those of scikit-fmm."""
         return None if self.peer is None else self.whole.seconds / self.peer.seconds
 
 
@@ -75,7 +75,7 @@ class MarchTrial(Trial[Marched]):
     planner: MarchRuns
 
     def measure(self) -> Marched:
-        """Start the process and read what it prints."""
+        """Start the process and read its answer."""
         task = {"scene": self.scene, **asdict(self.planner)}
         what = f"fast marching on {self.planner.nodes:,} nodes a side"
         return self.decode(run_fresh("fresh", task, what))
@@ -91,12 +91,12 @@ class MarchRow:
 
     @property
     def error(self) -> float:
-        """At the goal, relative."""
+        """The relative error at the goal."""
         return self.found.distance / true_length(self.scene) - 1.0
 
     @property
     def bytes_per_node(self) -> float | None:
-        """Peak memory above what the process had before, where there are nodes enough."""
+        """Peak memory above the memory before; None where there are too few nodes."""
         before, peak, count = self.found.memory_before, self.found.memory_peak, self.nodes**2
         if before is None or peak is None or count < FEWEST_NODES:
             return None

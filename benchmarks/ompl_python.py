@@ -1,6 +1,6 @@
 """OMPL through Python, in a process of its own: ``python -m ... TASK``.
 
-What a user of OMPL's Python package would write: the objective is a class in Python, which
+It is what a user of OMPL's Python package would write: the objective is a class in Python that
 measures edges by Line-R with NumPy.
 """
 
@@ -21,7 +21,7 @@ from .problems import load_problem
 from .processes import answer
 from .timing import Stopwatch
 
-# Boole's weights, but for panels' ends that two of them share.
+# Boole's weights. The end of a panel is the beginning of the next, so it has both weights there.
 WEIGHTS = np.array([7.0, 32.0, 12.0, 32.0, 7.0]) / 90.0
 
 Gradients = Callable[[Array], Array]  # points (m, 2) -> weighted gradients (m, layers, 2)
@@ -44,7 +44,7 @@ def _gradients_of_peaks(surface: Peaks) -> Gradients:
     return gradients
 
 
-# Of the four cubic B-splines on a cell, by powers of the place in it.
+# The coefficients of the four cubic B-splines on a cell, by powers of the place in it.
 _BASIS = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6.0
 _SLOPES = _BASIS[:, 1:] * np.arange(1, 4)
 
@@ -67,11 +67,11 @@ def _gradients_of_spline(surface: Spline) -> Gradients:
         patch = surface.coefficients[
             :, (j[:, None] + window)[:, :, None], (i[:, None] + window)[:, None, :]
         ]
-        found = np.empty((len(points), len(surface.weights), 2))
-        found[..., 0] = np.einsum("lmji,mj,mi->ml", patch, by, sx) / surface.dx
-        found[..., 1] = np.einsum("lmji,mj,mi->ml", patch, sy, bx) / surface.dy
-        found *= surface.weights[:, None]
-        return found
+        slopes = np.empty((len(points), len(surface.weights), 2))
+        slopes[..., 0] = np.einsum("lmji,mj,mi->ml", patch, by, sx) / surface.dx
+        slopes[..., 1] = np.einsum("lmji,mj,mi->ml", patch, sy, bx) / surface.dy
+        slopes *= surface.weights[:, None]
+        return slopes
 
     return gradients
 
@@ -171,7 +171,8 @@ PLANNERS = {
 }
 
 
-# The bindings do not hand out planners' parameters: their names in C++, and how to set them.
+# The bindings give no access to the parameters of planners by name. So here are their names in C++,
+# and how to set them in Python.
 SETTERS = {
     "range": ("setRange", float),
     "use_k_nearest": ("setKNearest", bool),
@@ -186,7 +187,7 @@ def _path(definition: Any) -> list[float]:
 
 
 def looks(problem: Problem, task: dict[str, Any]) -> list[dict[str, Any]]:
-    """Run the planner and look now and then, as the program in C++ does."""
+    """Run the planner and look at its path from time to time, as the program in C++ does."""
     from ompl import base, geometric, util
 
     util.noOutputHandler()

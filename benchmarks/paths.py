@@ -1,4 +1,4 @@
-"""From a problem to a path that is as good as the shortest, by each planner."""
+"""How long each planner takes from a problem to a path that is nearly the shortest."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from terrapath.problem import Solution, Status, scenes
 from .settings import Scale, true_length
 from .timing import Reading, Target, Timing, percent, timed
 
-# A path is near the truth when it is longer by no more than this share.
+# A path is near the shortest when it is longer by at most this share.
 NEAR = 1e-3
 
-# Options with which a planner does everything once, and soon ends.
+# Options with which a planner runs all of its code, but only for a short time.
 WARM_UP: dict[str, dict[str, Any]] = {
     "optimal": {"target_gap": 1.0},
     "rrt-star-r": {"samples": 500},
@@ -31,23 +31,23 @@ TARGET_SCENE, TARGET_SECONDS = "six-peaks", 0.1
 class PathRuns:
     """A planner and its options: the settings of a trial."""
 
-    label: str  # in tables
+    label: str  # the name in tables
     planner: str
     options: tuple[tuple[str, Any], ...] = ()
     refine: bool = False
     seeded: bool = False  # each repetition has its own seed
-    until_near: bool = False  # stops as soon as it believes its path near the truth
+    until_near: bool = False  # the planner stops when it believes its path near the shortest
     repeats: int
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return self.planner
 
 
 @dataclass(frozen=True)
 class PathsFound:
-    """What a planner found, an entry a repetition."""
+    """The paths that a planner found, one entry for each repetition."""
 
     timing: Timing
     excess: tuple[float, ...]  # over the true length, relative
@@ -55,12 +55,12 @@ class PathsFound:
 
     @property
     def is_near(self) -> bool:
-        """Is every path near the truth?"""
+        """Is every path near the shortest?"""
         return max(self.excess) <= NEAR
 
     @property
     def typical_excess(self) -> float:
-        """The median."""
+        """The median excess."""
         return median(self.excess)
 
 
@@ -71,7 +71,7 @@ class PathsTrial(Trial[PathsFound]):
     planner: PathRuns
 
     def measure(self) -> PathsFound:
-        """Plan a little to have all compiled, then as often as the settings say."""
+        """Plan once shortly, to compile everything, then as often as the settings say."""
         self._plan(0, WARM_UP.get(self.planner.planner, {}))
         runs = [self._plan(seed) for seed in range(self.planner.repeats)]
         truth = true_length(self.scene)
@@ -83,7 +83,7 @@ class PathsTrial(Trial[PathsFound]):
         )
 
     def _plan(self, seed: int, others: dict[str, Any] | None = None) -> tuple[Solution, Reading]:
-        """From the problem's numbers to the path; others : options in place of the planner's."""
+        """Plan from the problem's numbers. others : options in place of the planner's own."""
         options = {**dict(self.planner.options), **(others or {})}
         if self.planner.seeded:
             options["seed"] = seed
@@ -101,7 +101,7 @@ class PathsTrial(Trial[PathsFound]):
 
 
 def contenders(scale: Scale) -> list[PathRuns]:
-    """All planners that are compared; the first is the one that the target is for."""
+    """All planners that are compared; the target is for the first."""
     fast, slow = scale.path_repeats, scale.slow_repeats
     trees = [
         PathRuns(
@@ -151,7 +151,7 @@ class PathsData:
 
 
 def run_paths(scale: Scale, runner: Runner) -> PathsData:
-    """Each scene by each planner."""
+    """Plan on each scene with each planner."""
     planners = contenders(scale)
     trials = [PathsTrial(scene, planner) for scene in scale.scenes for planner in planners]
     results = iter(runner.run("paths", trials))

@@ -1,4 +1,4 @@
-"""Pictures of what peers were measured against."""
+"""Pictures of the comparisons with peers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .growth import GROWTH_TARGET, GrowthData
 from .timing import percent
 from .trees import NEAR, Best, SceneTrees, TreesData
 
-# Colours by program, lines by planner.
+# A colour for each program, a line style for each planner.
 COLOURS = {"terrapath": "#08519c", "ompl-cpp": "#d95f0e", "ompl-python": "#7f7f7f"}
 LINES = {"rrt-star-r": "-", "rrt-star": "-", "informed-rrt-star": "--", "bit-star": ":"}
 
@@ -44,7 +44,7 @@ def _draw_scene_trees(axes: Any, scene: SceneTrees) -> None:
         style = _line(best)
         colour = COLOURS[contender.program]
         name = label.replace("\\", "")
-        # The same planner with other options: beside it, but not before it.
+        # The same planner with other options: shown beside it, but not in front of it.
         strength = {"lw": 1.0, "alpha": 0.5} if contender.late else {"lw": 1.8}
         axes.loglog(seconds, middle, ls=style, color=colour, label=name, **strength)
         shown = [value if math.isfinite(value) else middle[k] for k, value in enumerate(high)]
@@ -52,7 +52,7 @@ def _draw_scene_trees(axes: Any, scene: SceneTrees) -> None:
 
 
 def draw_trees(data: TreesData, directory: Path) -> list[Path]:
-    """Excess against seconds, a panel a scene: medians and quartiles."""
+    """Excess against seconds, one panel for each scene: medians and quartiles."""
     columns = min(len(data.scenes), 2)
     rows = -(-len(data.scenes) // columns)
     figure = new_figure(5.6 * columns + 2.6, 4.4 * rows)
@@ -75,7 +75,7 @@ def draw_trees(data: TreesData, directory: Path) -> list[Path]:
 
 
 def draw_grids(data: GridsData, directory: Path) -> list[Path]:
-    """Error against seconds, a panel a scene, a line a method."""
+    """Error against seconds, one panel for each scene, one line for each method."""
     names = list(dict.fromkeys(row.scene for row in data.rows))
     figure = new_figure(4.6 * len(names) + 2.8, 4.4)
     panels = figure.subplots(1, len(names), squeeze=False, sharey=True)
@@ -100,7 +100,7 @@ def draw_grids(data: GridsData, directory: Path) -> list[Path]:
 
 
 def draw_growth(data: GrowthData, directory: Path) -> list[Path]:
-    """Seconds against samples, and what the target allows."""
+    """Seconds against samples, and the growth that the target allows."""
     figure = new_figure(6.4, 4.6)
     axes = figure.subplots()
     for k, name in enumerate(dict.fromkeys(row.scene for row in data.rows)):

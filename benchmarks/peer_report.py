@@ -1,4 +1,4 @@
-"""The report's parts about peers, in Markdown."""
+"""The report's sections about peers, in Markdown."""
 
 from __future__ import annotations
 
@@ -64,16 +64,17 @@ def _scene_trees(name: str, scene: SceneTrees) -> Iterator[str]:
 
 
 def trees_lines(data: TreesData) -> list[str]:
-    """Each planner on each scene."""
+    """The section on trees: each planner on each scene."""
     shown = [line for name, scene in data.scenes.items() for line in _scene_trees(name, scene)]
     return [
         *_paragraphs(
-            "Seconds until the median path is within so much of the shortest path, by its true "
-            "length under h, whatever the planner believes. One core each; the best options are "
-            f"those of a small sweep that get within {percent(NEAR)} first. OMPL's objective is "
-            "the same Line-R, with the same panels, and obstacles are tested exactly; in C++ with "
-            "the plane's distance as heuristic and ellipses for informed samples. Through Python "
-            "the objective is written with NumPy, and the options are those that were best in C++.",
+            "Seconds until the median path is within the given share of the shortest path, by its "
+            "true length under h, whatever the planner believes. One core each; the best options "
+            f"are those of a small sweep that get within {percent(NEAR)} first. OMPL's objective "
+            "is the same Line-R, with the same panels, and obstacles are tested exactly; in C++ "
+            "with the plane's distance as heuristic and ellipses for informed samples. Through "
+            "Python the objective is written with NumPy, and the options are those that were best "
+            "in C++.",
             f"Seeds: {data.seeds}; fewer for OMPL's other planners through Python.",
             _named(data.versions),
             *data.missing,
@@ -93,15 +94,16 @@ def _grid_row(row: GridRow) -> list[str]:
 
 
 def grids_lines(data: GridsData) -> list[str]:
-    """Each method on each lattice."""
+    """The section on lattices and meshes: each method on each of them."""
     header = ["scene", "method", "nodes a side", "seconds", "error at the goal"]
     return [
         *_paragraphs(
             "The distance from start to goal over height alone, from the problem's numbers: laying "
-            "out the lattice or the mesh is part of it. MCP_Geometric knows one cost a cell and no "
-            "direction; it is given det(h)^(1/4), the geometric mean of what h stretches lengths "
-            "by. potpourri3d and pygeodesic take the lattice as a mesh of triangles; exact there "
-            "is what is exact on the triangles. Edge flips find a locally shortest path.",
+            "out the lattice or the mesh is part of it. MCP_Geometric knows one cost for each cell "
+            "and no direction; it is given det(h)^(1/4), the geometric mean of the factors by "
+            "which h stretches lengths. potpourri3d and pygeodesic take the lattice as a mesh of "
+            "triangles; exact there means exact on the triangles. Edge flips find a locally "
+            "shortest path.",
             _named(data.versions),
             *data.missing,
         ),
@@ -123,20 +125,20 @@ def _growth_row(row: GrowthRow) -> list[str]:
 
 
 def growth_lines(data: GrowthData) -> list[str]:
-    """Each number of samples."""
+    """The section on growth: each number of samples."""
     header = ["scene", "samples", "vertices", "seconds", "length", "bytes a sample", "GB in all"]
     return [
         *_paragraphs(
             "RRT\\*-R with its default step, samples drawn everywhere; each in a process of its "
-            "own, warm. Memory is the process's peak, and for a sample what that is above the "
-            "peak before."
+            "own, warm. Memory is the process's peak; for a sample, it is how far the peak is "
+            "above the peak before."
         ),
         *markdown_table(header, map(_growth_row, data.rows)),
     ]
 
 
 def edges_lines(data: EdgesData) -> list[str]:
-    """Both surfaces."""
+    """The section on edges: both surfaces."""
     rows = []
     for kind, found in data.found.items():
         loop, difference = found.loop, found.difference
@@ -155,7 +157,7 @@ def edges_lines(data: EdgesData) -> list[str]:
     return [
         *_paragraphs(
             f"{data.edges:,} edges at random, up to 1 long, two layers, one application of Line-R "
-            "each, one after another on one core; by turns with the same in C++.",
+            "each, one after another on one core; taking turns with the same in C++.",
             version,
             *data.missing,
         ),

@@ -1,4 +1,4 @@
-"""Other programs that do the same: found, or named as missing."""
+"""Peers, which are other programs that do the same: loaded, or named as missing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Peer:
 
     @property
     def missing(self) -> str:
-        """What is said where it is not installed."""
+        """A sentence for the report where it is not installed."""
         return (
             f"{self.name} is not installed and was left out; `pip install 'terrapath[bench]'` "
             "installs it."

@@ -17,7 +17,7 @@ from terrapath.planners import plan
 from terrapath.problem import Problem, scenes
 from terrapath.space.free_space import Circle
 
-# Discs across the shortest path of three-peaks, and across the ways around them.
+# Discs on the shortest path of three-peaks, and on the paths around them.
 DISCS = (
     Circle(5.0, 4.6, 1.5),
     Circle(7.6, 7.0, 1.3),
@@ -34,7 +34,7 @@ def _three_peaks_discs() -> Problem:
 
 
 def _jacksboro() -> Problem:
-    """Without the cells along its edges, of which some have no data: the peers know no masks."""
+    """The scene without the cells along its edges. Some have no data, and peers take no masks."""
     whole = scenes.load("jacksboro")
     cell = 2.0 * whole.surface.resolution
     low, high = whole.bounds[:2], whole.bounds[2:]
@@ -56,7 +56,7 @@ def load_problem(name: str) -> Problem:
 
 @cache
 def problem_settings(name: str) -> dict[str, Any]:
-    """What makes a problem, its surface as a hash: a terrain model is too much for each trial."""
+    """All that defines a problem; the surface as a hash, because a terrain model is too large."""
     problem = load_problem(name)
     digest = hashlib.sha256()
     for field, array in problem.surface.data._asdict().items():
@@ -81,17 +81,17 @@ class OptimumRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return "optimum"
 
 
 @dataclass(frozen=True)
 class Optimum:
-    """The length that paths are measured against, map units."""
+    """The length of the shortest path, which others are compared with, map units."""
 
     length: float
-    gap: float | None  # proven of it; None where nothing is
-    searched: bool = True  # by ``optimal``; otherwise it is known to ten digits
+    gap: float | None  # the proven gap; None where nothing is proven
+    searched: bool = True  # found by ``optimal``; otherwise it is known to ten digits
 
 
 @dataclass(frozen=True)

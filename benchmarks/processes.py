@@ -18,11 +18,11 @@ ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_TH
 
 
 def run_fresh(module: str, task: dict[str, Any], what: str, timeout: float | None = None) -> Any:
-    """What ``python -m`` prints of a module of this package that is given a task, from JSON.
+    """Run a module of this package in a fresh process; returns its answer to a task, from JSON.
 
-    what : is said where it fails, in a TerrapathError. One core is used. timeout : seconds.
-    What a process measures that has to compile is thrown away and measured again: it allocates
-    from what the compiler has freed, and its peak of memory says nothing.
+    what : names the work in a TerrapathError, where it fails. timeout : seconds. One core is used.
+    A process that had to compile kernels is run again: it allocates from memory that the compiler
+    has freed, so its peak memory says nothing.
     """
     reply = _reply(module, task, what, timeout)
     if reply["compiled"]:
@@ -42,12 +42,12 @@ def _reply(module: str, task: dict[str, Any], what: str, timeout: float | None) 
     if done.returncode != 0:
         lines = done.stderr.strip().splitlines() or ["no message"]
         raise TerrapathError(f"{what} ended with code {done.returncode}: {lines[-1]}")
-    # Libraries may greet first.
+    # Libraries may print something first.
     return json.loads(done.stdout.strip().splitlines()[-1])
 
 
 def answer(measure: Callable[..., Any]) -> None:
-    """In such a process: print as JSON what is measured of the task's entries, by their names."""
+    """In the fresh process: measure with the task's entries as arguments, and print JSON."""
     found = measure(**json.loads(sys.argv[1]))
     reply = {"compiled": cache_statistics()["compiled"], "found": found}
     print(json.dumps(reply, default=asdict))

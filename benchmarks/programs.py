@@ -1,4 +1,4 @@
-"""Programs in C++ to measure against: found, compiled once, or named as missing."""
+"""Programs in C++ to compare with: compiled once, or named as missing."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ class Library:
 
     name: str
     headers: tuple[str, ...]  # where to find one: patterns below an include directory
-    version: str  # begins the names of its parts in that header
+    version: str  # the beginning of the names of the version's parts in that header
     flags: tuple[str, ...]
-    others: tuple[str, ...] = ()  # further directories of headers
+    others: tuple[str, ...] = ()  # more directories of headers
 
     @cached_property
     def _header(self) -> Path | None:
         patterns = ((place, pattern) for place in INCLUDES for pattern in self.headers)
-        found = (path for place, pattern in patterns for path in sorted(place.glob(pattern)))
-        return next(found, None)
+        paths = (path for place, pattern in patterns for path in sorted(place.glob(pattern)))
+        return next(paths, None)
 
     @property
     def found_version(self) -> str | None:
@@ -49,7 +49,7 @@ class Library:
 
     @property
     def compiler_flags(self) -> list[str]:
-        """Where its headers are, and what to link."""
+        """The compiler's flags for its headers and for linking."""
         assert self._header is not None
         places = [self._header.parents[1], *(i / o for i in INCLUDES for o in self.others)]
         places = [place for place in places if place.is_dir() and place not in INCLUDES]
@@ -94,7 +94,7 @@ class Program:
 
     @property
     def version(self) -> str | None:
-        """Compiler and library; None where it cannot be run."""
+        """The versions of compiler and library; None where it cannot be run."""
         if self.problem is not None:
             return None
         library = self.library
@@ -103,11 +103,11 @@ class Program:
 
     @property
     def missing(self) -> str:
-        """What is said where it cannot be run."""
+        """A sentence for the report where it cannot be run."""
         return f"{self.name} was left out: {self.problem}."
 
     def run(self, arguments: Sequence[str | Path], **environment: str) -> Any:
-        """What it prints, from JSON. Raises TerrapathError where it fails."""
+        """Run it; returns what it prints, from JSON. Raises TerrapathError where it fails."""
         command = [str(self._compile()), *map(str, arguments)]
         done = subprocess.run(
             command,
@@ -124,11 +124,11 @@ class Program:
     @cached_property
     def _compiler_version(self) -> str:
         command = [str(self._compiler), "--version"]
-        told = subprocess.run(command, capture_output=True, text=True, check=False).stdout
-        return next(iter(told.splitlines()), "unknown compiler")
+        printed = subprocess.run(command, capture_output=True, text=True, check=False).stdout
+        return next(iter(printed.splitlines()), "unknown compiler")
 
     def _compile(self) -> Path:
-        """The program's file, kept for as long as sources, compiler and library are the same."""
+        """The program's file; it is used again while sources, compiler and library are the same."""
         library = self.library
         flags = [] if library is None else library.compiler_flags
         known = [self._compiler_version, *FLAGS, *flags]

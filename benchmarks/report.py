@@ -21,7 +21,7 @@ from .timing import Target, Timing, percent
 
 @dataclass(frozen=True)
 class Finding:
-    """An experiment's part of the report."""
+    """An experiment's section of the report."""
 
     title: str
     targets: list[Target]
@@ -49,7 +49,7 @@ def _targets_table(targets: Iterable[Target]) -> list[str]:
 
 
 def bound_lines(data: BoundData) -> list[str]:
-    """Each certificate of each scene."""
+    """The section on lower bounds: each certificate of each scene."""
     rows = [
         [
             scene,
@@ -66,10 +66,10 @@ def bound_lines(data: BoundData) -> list[str]:
     wanted = ", ".join(f"{percent(gap)} in {limit:g} s" for gap, limit in GAP_TARGETS)
     return [
         "The best certificate so far each time a lattice is done, and how long after the start "
-        "that was. The true length is told to the search; gaps are over the bound. Nodes are those "
-        "that the certificate lies on: where they repeat, the finer lattice proved no more. "
-        f"Targets: {wanted}. `check` proves a "
-        "certificate again from nothing but the problem.",
+        "that was. The search is given the true length; gaps are relative to the lower bound. "
+        "Nodes are those that the certificate lies on: where they repeat, the finer lattice proved "
+        f"no more. Targets: {wanted}. `check` proves a certificate again from nothing but the "
+        "problem.",
         "",
         *markdown_table(header, rows),
     ]
@@ -92,19 +92,19 @@ def _marching_row(row: MarchRow) -> list[str]:
 
 
 def marching_lines(data: MarchData) -> list[str]:
-    """Each scene on each lattice."""
+    """The section on fast marching: each scene on each lattice."""
     peer = SCIKIT_FMM.missing
     if data.peer is not None:
         peer = (
             f"scikit-fmm {data.peer} solves the isotropic equation on the same lattice, all "
-            "speeds 1, second order; it was run by turns with terrapath."
+            "speeds 1, second order; it took turns with terrapath in one process."
         )
     header = ["scene", "nodes a side", "stencils", "dependents", "march", "in all", "scikit-fmm"]
     header += ["ratio", "error at the goal", "error of HFM", "bytes a node", "GB in all"]
     return [
         "The distance field of h from the start, second order, in seconds; dependents are the "
         "lists of which nodes depend on which. Each lattice has a process of its own, warm. Memory "
-        "is the process's peak, and for a node what that is above the peak before.",
+        "is the process's peak; for a node, it is how far the peak is above the peak before.",
         "",
         peer,
         "",
@@ -140,7 +140,7 @@ def _proofs(data: PathsData) -> Iterable[str]:
 
 
 def paths_lines(data: PathsData) -> list[str]:
-    """Seconds and excess of every planner on every scene."""
+    """The section on paths: seconds and excess of every planner on every scene."""
     return [
         "From the problem's numbers to a path, warm. In brackets where not every path is within "
         f"{percent(NEAR)} of the true length. *Until near* means that the planner stops when it "
@@ -157,7 +157,7 @@ def paths_lines(data: PathsData) -> list[str]:
 
 
 def large_maps_lines(data: LargeMapData) -> list[str]:
-    """Each map."""
+    """The section on large maps."""
     rows = [
         [
             f"{cells:,}",
@@ -184,7 +184,7 @@ def large_maps_lines(data: LargeMapData) -> list[str]:
 
 
 def startup_lines(data: StartData) -> list[str]:
-    """Each command."""
+    """The section on start-up: each command."""
     rows = [
         [
             runs.label,
@@ -203,7 +203,7 @@ def startup_lines(data: StartData) -> list[str]:
 
 
 def _disturbance(timings: Sequence[Timing]) -> str:
-    """How busy the machine was with other things."""
+    """A sentence on how busy the machine was with other jobs."""
     waiting = median(timing.waiting for timing in timings)
     return (
         "Seconds are medians, of processor time or of wall time, whichever is less: the "

@@ -39,7 +39,7 @@ from .timing import Target, Timing, percent
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is measured, and how it is shown; ``data`` is what ``run`` returns."""
+    """What is measured, and how it is shown. The other functions get what ``run`` returns."""
 
     title: str
     run: Callable[[Scale, Runner], Any]
@@ -49,7 +49,7 @@ class Experiment:
     draw: Callable[[Any, Path], list[Path]]
 
     def finding(self, data: Any, directory: Path) -> report.Finding:
-        """The experiment's part of the report, its pictures drawn."""
+        """Draw the experiment's pictures; returns its section of the report."""
         return report.Finding(
             self.title,
             self.targets(data),
@@ -136,7 +136,7 @@ EXPERIMENTS = {
 
 
 def chosen_experiments(what: Sequence[str]) -> list[str]:
-    """Names of the experiments asked for, once each; all where none is."""
+    """The names of the chosen experiments, each once; all where none is named."""
     for name in what:
         if name not in EXPERIMENTS:
             raise InputError(f"what={name!r} is not known; choose some of {', '.join(EXPERIMENTS)}")
@@ -144,7 +144,7 @@ def chosen_experiments(what: Sequence[str]) -> list[str]:
 
 
 def _source_stamp() -> str:
-    """Hash of the package's source: times of other code are not mixed with these."""
+    """A hash of the package's source, so that times of other code are not mixed with these."""
     package = Path(terrapath.__file__).parent
     digest = hashlib.sha256()
     for source in sorted(package.rglob("*.py")):
@@ -161,8 +161,8 @@ def benchmark(
 ) -> Path:
     """Measure, draw and report.
 
-    what : some of ``EXPERIMENTS``; all where none is named. output : directory; a run that was
-    stopped there goes on, with the same code on the same machine. quick : fewer repetitions
+    what : some of ``EXPERIMENTS``; all where none is named. output : a directory; a run that was
+    stopped there continues, with the same code on the same machine. quick : fewer repetitions
     and smaller lattices. Returns the report's path.
     Raises InputError where the directory belongs to a run with other settings.
     """

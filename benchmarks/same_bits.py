@@ -1,11 +1,11 @@
-"""Digests of what the planners answer, to see whether a change altered a bit of any of it.
+"""Digests of the planners' answers, to see whether a change of the code altered any bit of them.
 
     python -m benchmarks.same_bits --store     # before the change
     python -m benchmarks.same_bits             # after it: names what differs, exit code 1
 
 The problems are the six scenes of the paper, the Jacksboro fault and ten random ones with
-obstacles. Bits belong to a machine and its libraries, so ``same_bits.json`` names both: where
-they are others, store the digests of the code as it was first.
+obstacles. Bits depend on the machine and on libraries, so ``same_bits.json`` names both. On
+another machine, first store the digests of the code before the change.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SAMPLES = 1_500
 
 
 def digest(*arrays: Any) -> str:
-    """Of the bytes of arrays and numbers, 16 hexadecimal digits."""
+    """A digest of the bytes of arrays and numbers, 16 hexadecimal digits."""
     made = hashlib.sha256()
     for array in arrays:
         made.update(np.ascontiguousarray(array).tobytes())
@@ -40,7 +40,7 @@ def digest(*arrays: Any) -> str:
 
 
 def random_problem(seed: int) -> tp.Problem:
-    """Peaks (even seeds) or a grid (odd ones), with a box, a disc and blocked cells."""
+    """Peaks (even seeds) or a grid (odd seeds), with a box, a disc and blocked cells."""
     rng = np.random.default_rng(seed)
     axis = np.linspace(0.0, SIDE, 21)
     if seed % 2:
@@ -66,7 +66,7 @@ def problems() -> Iterator[tuple[str, tp.Problem]]:
 
 
 def of_solution(solution: tp.Solution) -> str:
-    """Digest of path, lengths, bound and tree."""
+    """A digest of path, lengths, lower bound and tree."""
     parts: list[Any] = [solution.samples]
     if solution.path is not None:
         parts += [solution.path.points, solution.length, solution.cost]
@@ -79,12 +79,12 @@ def of_solution(solution: tp.Solution) -> str:
 
 
 def planned(name: str, **options: Any) -> Callable[[tp.Problem], str]:
-    """What a planner answers."""
+    """A measure: the digest of a planner's answer."""
     return lambda problem: of_solution(tp.plan(problem, name, **options))
 
 
 def field(problem: tp.Problem) -> str:
-    """The distance field, and a path through it."""
+    """A digest of the distance field and a path through it."""
     surface, bounds = problem.surface, problem.bounds
     made = tp.distance_field(surface, problem.start, bounds=bounds, spacing=bounds.side / 120)
     path = made.path_to(problem.goal)
@@ -106,7 +106,7 @@ MEASURES: dict[str, Callable[[tp.Problem], str]] = {
 
 
 def measured(name: str, problem: tp.Problem) -> Iterator[tuple[str, str]]:
-    """Every digest of one problem; rays on a map are left out, for they take minutes."""
+    """Every digest of one problem; rays on a map are left out, because they take minutes."""
     for what, measure in MEASURES.items():
         if what == "geodesic-traversal" and name not in SCENES:
             continue
@@ -114,7 +114,7 @@ def measured(name: str, problem: tp.Problem) -> Iterator[tuple[str, str]]:
 
 
 def machine() -> str:
-    """What bits depend on besides the code."""
+    """The machine and the libraries, which bits depend on besides the code."""
     import numba
     import scipy
 
@@ -125,7 +125,7 @@ def machine() -> str:
 
 
 def main() -> int:
-    """Store or compare."""
+    """Store the digests, or compare them with the stored ones; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--store", action="store_true", help="keep the digests of this code")
     store = parser.parse_args().store

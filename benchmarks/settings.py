@@ -1,4 +1,4 @@
-"""How much is run."""
+"""The sizes and numbers of all measurements."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ SCENES = tuple(name for name, scene in scenes.SCENES.items() if scene.true_lengt
 
 @dataclass(frozen=True, kw_only=True)
 class Scale:
-    """How much is run. The defaults are a full run."""
+    """The sizes and numbers of all measurements. The defaults are a full run."""
 
     scenes: tuple[str, ...] = SCENES
-    target_gap: float = 5e-4  # of the bound
+    target_gap: float = 5e-4  # of the lower bound
     bound_repeats: int = 3
     march_scenes: tuple[str, ...] = ("six-peaks", "one-peak")
     # Nodes on a side of the lattice, and repetitions.
@@ -25,7 +25,7 @@ class Scale:
     )
     map_cells: tuple[int, ...] = (5_000, 10_000)  # on a side
     path_repeats: int = 9
-    slow_repeats: int = 3  # of planners that take seconds, or that chance has a part in
+    slow_repeats: int = 3  # of planners that take seconds, or use random numbers
     tree_samples: tuple[int, ...] = (3_000, 10_000, 30_000)
     most_samples: int = 100_000
     warm_starts: int = 9

@@ -1,4 +1,4 @@
-"""Start-up: how long the command takes from the prompt to the answer, warm and cold."""
+"""Start-up: how long the command takes from the prompt to the answer, warm or cold."""
 
 from __future__ import annotations
 
@@ -30,35 +30,35 @@ class StartRuns:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return f"{self.arguments[0].strip('-')}-{'cold' if self.cold else 'warm'}"
 
     @property
     def label(self) -> str:
-        """What the report calls it."""
+        """The name in the report."""
         return f"`terrapath {' '.join(self.arguments)}`, {'cold' if self.cold else 'warm'}"
 
 
 @dataclass(frozen=True)
 class Started:
-    """Whole processes, one after another."""
+    """The times of whole processes, one after another."""
 
     timing: Timing
 
 
 @dataclass(frozen=True)
 class StartTrial(Trial[Started]):
-    """One command in processes of its own, with a cache of kernels of its own."""
+    """One command, in processes of its own and with its own cache of kernels."""
 
     planner: StartRuns
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The command alone."""
+        """The settings; nothing but the command counts."""
         return {"options": asdict(self.planner)}
 
     def measure(self) -> Started:
-        """Run it again and again; once before, unless it is to be cold."""
+        """Run it several times, after one run that is not measured unless it is to be cold."""
         runs = self.planner
         with tempfile.TemporaryDirectory() as shared:
             if not runs.cold:
@@ -90,7 +90,7 @@ def run_afresh(arguments: tuple[str, ...], cache: str) -> Reading:
         raise TerrapathError(
             f"terrapath {' '.join(arguments)} ended with code {done.returncode}: {lines[-1]}"
         )
-    # Where the system does not tell of children, wall time is all there is.
+    # Where the system gives no times of children, only wall time is known.
     return Reading(wall, _seconds_of_children() - before or wall)
 
 
@@ -102,7 +102,7 @@ def _seconds_of_children() -> float:
 
 @dataclass(frozen=True)
 class StartData:
-    """Each command, warm or cold, and what it took."""
+    """Each command, warm or cold, and its times."""
 
     found: list[tuple[StartRuns, Started]]
 
@@ -111,8 +111,8 @@ LIMITS = {(HELP, False): 0.3, (PLAN, False): 1.5, (PLAN, True): 20.0}  # seconds
 
 
 def run_startup(scale: Scale, runner: Runner) -> StartData:
-    """Each command."""
-    asked = [
+    """Measure each command."""
+    commands = [
         StartRuns(
             arguments=arguments,
             cold=cold,
@@ -120,12 +120,12 @@ def run_startup(scale: Scale, runner: Runner) -> StartData:
         )
         for arguments, cold in LIMITS
     ]
-    trials = [StartTrial("start", runs) for runs in asked]
-    return StartData(list(zip(asked, runner.run("start-up", trials), strict=True)))
+    trials = [StartTrial("start", runs) for runs in commands]
+    return StartData(list(zip(commands, runner.run("start-up", trials), strict=True)))
 
 
 def startup_targets(data: StartData) -> list[Target]:
-    """Seconds of whole processes."""
+    """The seconds of whole processes."""
     return [
         Target(f"{runs.label}: whole process", limit, "s", found.timing.seconds)
         for runs, found in data.found

@@ -19,7 +19,7 @@ class Reading(NamedTuple):
 
 
 class Stopwatch:
-    """Runs from when it is made."""
+    """A stopwatch that runs from when it is made."""
 
     def __init__(self) -> None:
         self._wall, self._processor = time.perf_counter(), time.process_time()
@@ -30,7 +30,7 @@ class Stopwatch:
 
 
 def timed(work: Callable[[], Work]) -> tuple[Work, Reading]:
-    """What some work returns, and how long it took."""
+    """The result of some work, and how long it took."""
     watch = Stopwatch()
     result = work()
     return result, watch.read()
@@ -38,50 +38,50 @@ def timed(work: Callable[[], Work]) -> tuple[Work, Reading]:
 
 @dataclass(frozen=True)
 class Timing:
-    """How long the same work took, an entry a repetition. Seconds."""
+    """How long the same work took, one entry for each repetition. Seconds."""
 
     wall: tuple[float, ...]
     processor: tuple[float, ...]
 
     @classmethod
     def of(cls, readings: Iterable[Reading]) -> Timing:
-        """The readings of all repetitions."""
+        """The timing with the readings of all repetitions."""
         return cls(*map(tuple, zip(*readings, strict=True)))
 
     def __add__(self, other: Timing) -> Timing:
-        """Of two kinds of work together, repetition by repetition."""
+        """The timing of two kinds of work together, repetition by repetition."""
         pairs = zip((self.wall, self.processor), (other.wall, other.processor), strict=True)
         return Timing(*(tuple(a + b for a, b in zip(*pair, strict=True)) for pair in pairs))
 
     @property
     def seconds(self) -> float:
-        """The median, by the clock that shows less.
+        """The smaller of the two medians, of processor time and of wall time.
 
-        Processor time leaves out waiting while other jobs had the core; wall time is the less
+        Processor time leaves out waiting while other jobs had the core. Wall time is smaller
         where work is spread over several cores.
         """
         return min(median(self.wall), median(self.processor))
 
     @property
     def waiting(self) -> float:
-        """Wall time over processor time, by their medians."""
+        """The ratio of wall time to processor time, by their medians."""
         return median(self.wall) / median(self.processor)
 
 
 @dataclass(frozen=True)
 class Target:
-    """A figure that is to be reached, and what was measured."""
+    """A limit for a measure, and what was measured."""
 
     what: str
     limit: float
     unit: str
     found: float | None  # None where it was never reached
-    instead: str = ""  # said then
-    at_least: bool = False  # the limit is one from below
+    instead: str = ""  # what the report says then
+    at_least: bool = False  # the limit is a lower one
 
     @property
     def met(self) -> bool:
-        """Is what was found on the right side of the limit?"""
+        """Is what was measured on the right side of the limit?"""
         if self.found is None:
             return False
         return self.found >= self.limit if self.at_least else self.found <= self.limit

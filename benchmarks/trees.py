@@ -1,4 +1,4 @@
-"""RRT*-R beside OMPL's planners: how soon their paths are how short."""
+"""RRT*-R beside OMPL's planners: how the length of their paths falls with time."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ from .timing import Target, Timing, percent, timed
 
 
 class Looks(NamedTuple):
-    """When a run is looked at."""
+    """When a run is looked at, in samples or seconds."""
 
-    growth: float  # of samples or seconds from one look to the next
-    share: float  # of all samples or seconds that may be given, at the last
+    growth: float  # ratio of the samples or seconds of one look to those of the look before
+    share: float  # a run has this share of all samples or seconds
 
 
 SWEEP, SHOWN = Looks(1.5, 0.5), Looks(1.25, 1.0)
 
-# How many of the options that a sweep with few seeds finds best are tried with more: of few seeds
-# one that finds a good valley late decides the median.
+# The number of choices of options that are tried with more seeds after a sweep with few: among few
+# seeds, a single one that finds a good valley late decides the median.
 FINALISTS = 3
 
-# Excess over the optimum that all are to get within, and those that are shown.
+# The excess over the optimum that all should get below, and the excesses that are shown.
 NEAR = 5e-3
 LEVELS = (5e-2, 2e-2, 1e-2, NEAR)
 
-# How many times less time than OMPL's.
+# The targets: ratios of OMPL's time to ours.
 CPP_TARGET, PYTHON_TARGET, NEAR_TARGET = 20.0, 500.0, 20.0
 
-# Seconds that a process of Python may take until it plans, on the slowest machine.
+# Seconds that a Python process may take until it plans, on the slowest machine.
 LOADING = 120.0
 
 
@@ -69,18 +69,18 @@ class TreeRun:
     planner: str
     options: Options
     seed: int
-    first: float  # look: samples of terrapath's planners, seconds of the others
+    first: float  # the first look: samples for Terrapath's planners, seconds for the others
     last: float
     growth: float
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return f"{self.program}-{self.planner}"
 
     @property
     def looks(self) -> list[int]:
-        """After how many samples."""
+        """The numbers of samples after which the run is looked at."""
         count = max(math.ceil(math.log(self.last / self.first, self.growth) - 1e-9), 0)
         return [
             *(round(self.first * self.growth**k) for k in range(count)),
@@ -90,7 +90,7 @@ class TreeRun:
 
 @dataclass(frozen=True)
 class TreeTrial(Trial[Curve]):
-    """One run."""
+    """One run of one planner."""
 
     planner: TreeRun
 
@@ -100,15 +100,15 @@ class TreeTrial(Trial[Curve]):
         return {"scene": problem_settings(self.scene), "options": asdict(self.planner)}
 
     def measure(self) -> Curve:
-        """Plan, and look now and then."""
+        """Plan, and look at the path from time to time."""
         if self.planner.program == TERRAPATH:
             return self._grow()
         problem = load_problem(self.scene)
-        found = self._in_cpp() if self.planner.program == CPP else self._in_python()
-        return curve_of_looks(problem, found["looks"])
+        answer = self._in_cpp() if self.planner.program == CPP else self._in_python()
+        return curve_of_looks(problem, answer["looks"])
 
     def _grow(self) -> Curve:
-        """A run for each look: each is of as many samples, and nothing but planning is timed."""
+        """Plan anew for each look, with its number of samples, so that only planning is timed."""
         run, problem = self.planner, load_problem(self.scene)
         options = {"seed": run.seed, **dict(run.options)}
         plan(problem, run.planner, samples=run.looks[0], **options)
@@ -152,11 +152,11 @@ class SceneTrees:
     found: dict[str, Best]  # by label
 
     def excess(self, length: float) -> float:
-        """Relative, over the optimum."""
+        """The relative excess of a length over the optimum."""
         return length / self.optimum.length - 1.0
 
     def time_within(self, label: str, excess: float) -> float | None:
-        """Seconds until the median is within that of the optimum; None where it never is."""
+        """Seconds until the median excess is at most this; None where it never is."""
         return self.found[label].curve.time_to(self.optimum.length * (1.0 + excess))
 
 
@@ -166,12 +166,12 @@ class TreesData:
 
     scenes: dict[str, SceneTrees]
     seeds: int
-    missing: list[str]  # what is said of peers that are
+    missing: list[str]  # a sentence for each peer that is missing
     versions: dict[str, str]
 
 
 def _score(contender: Contender, curve: MedianCurve, optimum: Optimum) -> tuple[float, float]:
-    """Less is better: the time to get near, and where that is never or late, how near."""
+    """A key for sorting, the best first: the time to get near, else the length that is reached."""
     near = optimum.length * (1.0 + NEAR)
     seconds = None if contender.late else curve.time_between_looks(near)
     return (math.inf if seconds is None else seconds, curve.best)
@@ -187,7 +187,7 @@ class _Comparison:
         self.found: dict[str, Best] = {}
 
     def add(self, contender: Contender) -> None:
-        """With its best options, all seeds."""
+        """Run a contender with its best options and all seeds."""
         options = self._best_options(contender)
         seeds = self.scale.few_tree_seeds if contender.few else self.scale.tree_seeds
         curve = self._curve(contender, options, seeds, SHOWN)
@@ -204,7 +204,7 @@ class _Comparison:
     def _ranked(
         self, contender: Contender, choices: Sequence[Options], seeds: int
     ) -> list[Options]:
-        """The choices by the median of so many seeds, the best first."""
+        """The choices of options by the median of this many seeds, the best first."""
         scored = {
             options: _score(contender, self._curve(contender, options, seeds, SWEEP), self.optimum)
             for options in choices
@@ -214,7 +214,7 @@ class _Comparison:
     def _runs(
         self, contender: Contender, options: Options, seeds: int, looks: Looks
     ) -> list[TreeRun]:
-        """One for each seed."""
+        """One run for each seed."""
         scale = self.scale
         first, last = {
             TERRAPATH: (scale.tree_looks[0], scale.tree_looks[1]),
@@ -244,23 +244,23 @@ class _Comparison:
         return MedianCurve.of(self.runner.run(stage, [TreeTrial(self.scene, r) for r in runs]))
 
     def result(self) -> SceneTrees:
-        """No path is shorter than the optimum; where one is, the search for it fell short."""
+        """The comparison. Where a path is shorter than the optimum, it becomes the optimum."""
         shortest = min((best.curve.best for best in self.found.values()), default=math.inf)
         length = min(self.optimum.length, shortest)
         return SceneTrees(replace(self.optimum, length=length), self.found)
 
 
 def _present() -> tuple[set[str], dict[str, str], list[str]]:
-    """Programs that can be run, their versions, and what is said of the others."""
+    """Programs that can be run, their versions, and a sentence for each of the others."""
     peers: dict[str, Program | Peer] = {CPP: OMPL_PLANNERS, PYTHON: OMPL_PYTHON}
     versions = {name: peer.version for name, peer in peers.items()}
     missing = [peer.missing for name, peer in peers.items() if versions[name] is None]
-    found = {name: version for name, version in versions.items() if version is not None}
-    return {TERRAPATH, *found}, found, missing
+    present = {name: version for name, version in versions.items() if version is not None}
+    return {TERRAPATH, *present}, present, missing
 
 
 def run_trees(scale: Scale, runner: Runner) -> TreesData:
-    """Each scene by each planner."""
+    """Compare all contenders on each scene."""
     present, versions, missing = _present()
     found = {}
     for scene in scale.tree_scenes:
@@ -273,9 +273,10 @@ def run_trees(scale: Scale, runner: Runner) -> TreesData:
 
 
 def _at_equal_length(scene: SceneTrees, peer: str) -> tuple[float | None, str]:
-    """The peer's seconds over ours for the shortest median length that it reaches.
+    """The ratio of the peer's seconds to ours, for the shortest median length that it reaches.
 
-    Each with the options that get there first.
+    Each has the options that get there first. Where there is no ratio, the text says why;
+    otherwise it is that length's excess.
     """
 
     def curves_of(label: str) -> list[MedianCurve]:
@@ -304,7 +305,10 @@ def ompl_labels(scene: SceneTrees) -> list[str]:
 
 
 def _near_target(name: str, scene: SceneTrees) -> Iterator[Target]:
-    """The best of OMPL's planners; one that never gets there would have needed longer still."""
+    """The target beside the best of OMPL's planners.
+
+    If none gets near, its time is at least all the time that the planners were given.
+    """
     labels = ompl_labels(scene)
     if not labels:
         return
@@ -328,20 +332,20 @@ def _near_target(name: str, scene: SceneTrees) -> Iterator[Target]:
 
 
 def trees_targets(data: TreesData) -> list[Target]:
-    """Ratios of seconds, scene by scene."""
+    """The ratios of seconds, scene by scene."""
     targets = []
     for name, scene in data.scenes.items():
         for peer, limit in ((CPP_RRT, CPP_TARGET), (PYTHON_RRT, PYTHON_TARGET)):
             if peer in scene.found:
-                ratio, told = _at_equal_length(scene, peer)
+                ratio, text = _at_equal_length(scene, peer)
                 what = f"{name}: at equal length, {peer}'s seconds over {OURS}'s"
-                what += "" if ratio is None else f" (within {told})"
-                targets.append(Target(what, limit, "", ratio, told, at_least=True))
+                what += "" if ratio is None else f" (within {text})"
+                targets.append(Target(what, limit, "", ratio, text, at_least=True))
         targets += _near_target(name, scene)
     return targets
 
 
 def trees_timings(data: TreesData) -> list[Timing]:
-    """The last look of each contender."""
+    """The times of the last look of each contender."""
     found = (best for scene in data.scenes.values() for best in scene.found.values())
     return [best.curve.timing[-1] for best in found]

@@ -1,6 +1,6 @@
 // Line-R over a list of segments: edges PROBLEM SEGMENTS LENGTHS REPEATS
 //
-// SEGMENTS holds ax, ay, bx, by of each as 64-bit floats; LENGTHS is written, one a segment.
+// SEGMENTS holds ax, ay, bx, by of each segment as 64-bit floats; LENGTHS is written, one for each.
 // Prints {"wall": [...], "processor": [...]}: the seconds of each repetition.
 #include "surface.hpp"
 

@@ -2,12 +2,12 @@
 // planners PROBLEM PLANNER SEED SECONDS FIRST GROWTH [NAME=VALUE]...
 //
 // PLANNER is rrt-star, informed-rrt-star or bit-star; NAME=VALUE are OMPL's own parameters.
-// The planner runs for SECONDS and is looked at after FIRST seconds, and then each time as much
-// more time as GROWTH says has gone. Prints one line of JSON: for each look the seconds, what the
-// planner believes its path's length to be, and the path where it is a new one.
+// The planner runs for SECONDS. It is looked at after FIRST seconds, and then each time the seconds
+// have grown by the factor GROWTH. Prints one line of JSON: for each look the seconds, the length of
+// the path as the planner believes it, and the path where it is a new one.
 //
-// As is best for OMPL: obstacles are tested exactly; informed sampling draws from the ellipse
-// itself, for a path is never shorter than it looks from above; and so is the heuristic.
+// This is best for OMPL: obstacles are tested exactly. Informed sampling draws from the ellipse on
+// the plane, and the heuristic is the distance on the plane: no path is shorter than on the plane.
 #include "surface.hpp"
 
 #include <chrono>
@@ -145,7 +145,7 @@ void set_parameter(ob::Planner &planner, const std::string &text) {
 
 struct Look {
     double wall, processor, cost;
-    std::vector<double> path;  // x, y, x, y, ...; empty where it is that of the look before
+    std::vector<double> path;  // x, y, x, y, ...; empty where it is the same as at the look before
 };
 
 class Run {

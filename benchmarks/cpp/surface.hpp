@@ -51,7 +51,7 @@ struct Peaks {
         return h;
     }
 
-    // Square of the way that the layers rise between two points.
+    // The sum of the squared differences of the layers between two points.
     double squared_rise(double ax, double ay, double bx, double by) const {
         double total = 0.0;
         for (const Layer &layer : layers) {
@@ -72,7 +72,7 @@ struct Peaks {
     }
 };
 
-// The four uniform cubic B-splines that are alive at u in [0, 1], and their slopes.
+// The four uniform cubic B-splines that are not 0 at u in [0, 1], and their slopes.
 struct Basis {
     double value[4], slope[4];
 
@@ -151,7 +151,7 @@ struct Spline {
     }
 };
 
-// Line-R: the 5-point Boole rule on each of so many equal panels.
+// Line-R: the 5-point Boole rule on each of a number of equal panels.
 template <class Surface>
 double line_r(const Surface &surface, double ax, double ay, double bx, double by, int panels) {
     static const double weights[4] = {7.0 / 45.0, 16.0 / 45.0, 2.0 / 15.0, 16.0 / 45.0};

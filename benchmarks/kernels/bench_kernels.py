@@ -1,4 +1,4 @@
-"""Each case by turns with a loop that never changes. Nothing fails for being slow."""
+"""Each case takes turns with a loop that never changes. Nothing fails because it is slow."""
 
 import math
 import time
@@ -9,19 +9,19 @@ import pytest
 from cases import CASES
 from reference import TABLE, run_reference
 
-# Of the processor, which leaves out waiting for other jobs.
+# Processor time, which leaves out waiting for other jobs.
 CLOCK = time.process_time
 
-# The work of a case is repeated for so long, seconds, within these numbers of rounds: other jobs
-# come and go more slowly than rounds do.
+# The work of a case is repeated for this long, seconds, within these numbers of rounds. A round is
+# short against the time for which other jobs run.
 LONG_ENOUGH = 1.0
 FEWEST, MOST = 25, 300
 
-STEPS = 100_000  # of the reference loop, to see how long they take
+STEPS = 100_000  # of the reference loop, to measure how long a step takes
 
 
 def seconds(function, *arguments):
-    """How long a call takes."""
+    """The seconds that a call takes."""
     begun = CLOCK()
     function(*arguments)
     return CLOCK() - begun
@@ -30,9 +30,9 @@ def seconds(function, *arguments):
 @pytest.mark.benchmark(timer=CLOCK, disable_gc=True)
 @pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
 def test_kernel(benchmark, note, case):
-    """Rounds of a kernel, each after a run of the reference loop that takes about as long."""
+    """Measure rounds of a kernel, each after a run of the reference loop that takes as long."""
     work, loops = case.prepare(case.size), []
-    run_reference(TABLE, STEPS)  # compiled, as the work is by its first run
+    run_reference(TABLE, STEPS)  # compiles it; the first run of the work compiles the kernel
     work.run()
     long = seconds(work.run)
     steps = math.ceil(STEPS * long / seconds(run_reference, TABLE, STEPS))
@@ -43,7 +43,7 @@ def test_kernel(benchmark, note, case):
     )
     if benchmark.disabled:
         return
-    # Each round's own ratio: what slows the machine down lasts longer than a round.
+    # The ratio is of one round, because other jobs slow the machine down for longer than that.
     rounds = zip(benchmark.stats.stats.data, loops, strict=True)
     benchmark.extra_info.update(
         kernel=case.name,

@@ -1,4 +1,4 @@
-"""The table of cases: every kernel that is hot, and work for it of any size."""
+"""The table of cases: every kernel whose speed matters, and work of any size for it."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ LONGEST = 1.0  # segment, map units
 
 
 class Work(NamedTuple):
-    """What is measured, and how many items it does."""
+    """The call that is measured, and how many items it handles."""
 
     run: Callable[[], object]
     items: int
 
 
 class Case(NamedTuple):
-    """A kernel, called as planners call it."""
+    """A kernel, called in the same manner as planners call it."""
 
     name: str
     item: str  # what is counted
     prepare: Callable[[int], Work]  # for a size: items, or nodes on a side
     size: int
-    least: int  # size at which the work only shows that it runs
+    least: int  # the smallest size, which only shows that the work runs
 
 
 # Ground
@@ -53,14 +53,14 @@ def peaks() -> Surface:
 
 @cache
 def spline(*kinds: str) -> Surface:
-    """The spline through samples of both, all above 0 as costs must be."""
+    """The spline through samples of both layers; all are above 0, as costs must be."""
     axis = np.linspace(REGION[0], REGION[2], SAMPLES)
     values = np.moveaxis(peaks().values(np.stack(np.meshgrid(axis, axis), axis=-1)), -1, 0)
     return Surface.from_grid(values + 1.0, axis, axis, kinds=kinds or None)
 
 
 def costs() -> Surface:
-    """The second layer multiplies lengths."""
+    """The spline whose second layer is a cost, so that it multiplies lengths."""
     return spline("rise", "cost")
 
 
@@ -69,24 +69,24 @@ GROUNDS: dict[str, Callable[[], Surface]] = {"peaks": peaks, "spline": spline, "
 
 @cache
 def polygons() -> list[shapely.Polygon]:
-    """Sixty of them, with sixteen corners each, none over the start or the goal."""
+    """Sixty polygons with sixteen corners each, none over the start or the goal."""
     places = np.random.default_rng(1).uniform(1.0, 9.0, (60, 2))
     return [shapely.Point(place).buffer(0.3, quad_segs=4) for place in places]
 
 
 @cache
 def problem(ground: Callable[[], Surface], *, cluttered: bool = False) -> Problem:
-    """From corner to corner, through the polygons or over open ground."""
+    """The problem from corner to corner, among polygons or over open ground."""
     return Problem(ground(), START, GOAL, REGION, polygons() if cluttered else ())
 
 
 def places(count: int) -> Any:
-    """(count, 2), anywhere within the region."""
+    """Random points (count, 2) within the region."""
     return np.random.default_rng(0).uniform(REGION[0], REGION[2], (count, 2))
 
 
 def segments(count: int) -> tuple[Any, Any]:
-    """Both ends, (count, 2) each."""
+    """The two ends of random segments, (count, 2) each."""
     random, start = np.random.default_rng(2), places(count)
     end = start + random.uniform(-LONGEST, LONGEST, (count, 2)) / np.sqrt(2.0)
     return start, np.clip(end, REGION[0], REGION[2])
@@ -96,36 +96,36 @@ def segments(count: int) -> tuple[Any, Any]:
 
 
 def fill(kernel: Any, ground: Callable[[], Surface], shape: tuple[int, ...], count: int) -> Work:
-    """Numbers of some shape for each point."""
+    """Evaluate a kernel at points, with a result of some shape for each."""
     filled = np.empty((count, *shape))
     return Work(partial(kernel, ground().data, places(count), filled), count)
 
 
 def measure(kernel: Any, ground: Callable[[], Surface], count: int) -> Work:
-    """Lengths of segments."""
+    """Measure the lengths of segments."""
     return Work(partial(kernel, ground().data, *segments(count), np.empty(count)), count)
 
 
 def measure_truly(ground: Callable[[], Surface], count: int) -> Work:
-    """Lengths of segments to nine digits."""
+    """Measure the lengths of segments to nine digits."""
     return Work(partial(segment_lengths, ground(), *segments(count)), count)
 
 
 def avoid(count: int) -> Work:
-    """Segments against polygons."""
+    """Test segments against polygons."""
     space = problem(peaks, cluttered=True).free_space
     return Work(partial(space.segments_are_free, *segments(count)), count)
 
 
 def grow(ground: Callable[[], Surface], options: dict[str, Any], count: int) -> Work:
-    """A tree of so many samples."""
+    """Grow a tree with this many samples."""
     cluttered = options.get("informed", True)
     planner = RRTStar(samples=count, **options)
     return Work(partial(planner.solve, problem(ground, cluttered=cluttered)), count)
 
 
 def shoot(ground: Callable[[], Surface], count: int) -> Work:
-    """Geodesics from the start, with their Jacobi fields."""
+    """Trace geodesics from the start, with their Jacobi fields."""
     angles = np.linspace(0.2, 1.3, count)
 
     def run() -> list[object]:
@@ -135,18 +135,18 @@ def shoot(ground: Callable[[], Surface], count: int) -> Work:
 
 
 def lattice_of(side: int) -> Lattice:
-    """So many cells on a side."""
+    """A lattice with this many cells on a side."""
     return Lattice.spanning(problem(peaks).bounds, SIDE / side)
 
 
-def lay(ground: Callable[[], Surface], side: int) -> Work:
-    """Rows of the metric, stencils, and which nodes read which."""
+def make_stencils(ground: Callable[[], Surface], side: int) -> Work:
+    """Compute the rows of the metric, stencils and dependents."""
     lattice = lattice_of(side)
     return Work(partial(Medium.of_surface, ground(), lattice), lattice.nx * lattice.ny)
 
 
 def march(side: int) -> Work:
-    """Among polygons."""
+    """March among polygons."""
     lattice, of = lattice_of(side), problem(peaks, cluttered=True)
     medium = Medium.of_surface(of.surface, lattice, of.free_space)
     run = partial(march_from, of.surface, of.free_space, START, medium)
@@ -154,26 +154,26 @@ def march(side: int) -> Work:
 
 
 def look_up(count: int) -> Work:
-    """Distances between the nodes of a field."""
+    """Look up distances between the nodes of a field."""
     return Work(partial(field_of(problem(peaks), spacing=0.1).at, places(count)), count)
 
 
 def descend(side: int) -> Work:
-    """Down the field, back to its source."""
+    """Follow the field down to its source."""
     field = field_of(problem(peaks), spacing=SIDE / side)
     path = field.path_to(GOAL)
     return Work(partial(field.path_to, GOAL), len(path.points))
 
 
 def tighten(cluttered: bool, side: int) -> Work:
-    """A path from a lattice to the locally shortest one."""
+    """Refine a path from a lattice to the locally shortest one."""
     of = problem(peaks, cluttered=cluttered)
     path = FastMarching(spacing=SIDE / side).solve(of).path
     return Work(partial(refine, of, path), 1)
 
 
 def prove(side: int) -> Work:
-    """A lower bound from one lattice, not repaired."""
+    """Prove a lower bound from one lattice, without repairs."""
     lattice = lattice_of(side)
 
     def run() -> object:
@@ -183,14 +183,14 @@ def prove(side: int) -> Work:
 
 
 def check(side: int) -> Work:
-    """A lower bound, again."""
+    """Prove a lower bound again."""
     lattice = lattice_of(side)
     certificate = Search(problem(peaks), lattice, 1.5 * SIDE).certify()
     return Work(partial(certificate.check, problem(peaks)), lattice.nx * lattice.ny)
 
 
 def search_grid(side: int) -> Work:
-    """Dijkstra's algorithm among polygons, 16 neighbours."""
+    """Run Dijkstra's algorithm among polygons, with 16 neighbours."""
     of = problem(peaks, cluttered=True)
     planner = Dijkstra(spacing=SIDE / side)
     return Work(partial(planner.solve, of), lattice_of(side).nx * lattice_of(side).ny)
@@ -200,7 +200,7 @@ def search_grid(side: int) -> Work:
 
 
 def batches() -> Iterator[Case]:
-    """What is done to many points or segments at once, on every kind of ground."""
+    """Cases with many points or segments at once, on every kind of ground."""
     fills = {
         "values": (fill_values, (2,)),
         "jets": (fill_jets, (2, 6)),
@@ -228,8 +228,8 @@ CASES = [
     Case("tree, open ground", "sample", partial(grow, peaks, {"informed": False}), 3_000, 50),
     Case("rays, peaks", "ray", partial(shoot, peaks), 12, 1),
     Case("rays, spline", "ray", partial(shoot, spline), 2, 1),
-    Case("stencils, peaks", "node", partial(lay, peaks), 120, 12),
-    Case("stencils, spline", "node", partial(lay, spline), 120, 12),
+    Case("stencils, peaks", "node", partial(make_stencils, peaks), 120, 12),
+    Case("stencils, spline", "node", partial(make_stencils, spline), 120, 12),
     Case("fast marching", "node", march, 120, 12),
     Case("field, look-up", "point", look_up, 3_000, 8),
     Case("field, descent", "point", descend, 120, 12),

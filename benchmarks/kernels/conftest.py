@@ -1,4 +1,4 @@
-"""The ratios of a run: a table that shows them beside a stored baseline, and how it is stored."""
+"""The ratios of a run: a table that compares them with a stored baseline, and the storing."""
 
 import json
 from pathlib import Path
@@ -8,38 +8,38 @@ import pytest
 from terrapath.paper.report import machine_lines
 
 BASELINE = Path(__file__).with_name("baseline.json")
-SLOWER = 30.0  # percent, above which a kernel is marked
+SLOWER = 30.0  # a kernel that is slower by more than this is marked, percent
 
 MEASURED = pytest.StashKey[list[dict]]()
 
 
 def pytest_addoption(parser):
-    """How the baseline is made."""
+    """Add the option that stores the baseline."""
     parser.addoption(
         "--store-ratios", action="store_true", help="make the ratios of this run the baseline"
     )
 
 
 def pytest_configure(config):
-    """Nothing is measured yet."""
+    """Begin with an empty table."""
     config.stash[MEASURED] = []
 
 
 @pytest.fixture
 def note(request):
-    """Enter what was measured into the table."""
+    """A function that enters a measure into the table."""
     return request.config.stash[MEASURED].append
 
 
 def stored():
     """The baseline: its machine, and ratios by the names of kernels."""
     if not BASELINE.exists():
-        return {"machine": "none is stored", "ratios": {}}
+        return {"machine": "no baseline is stored", "ratios": {}}
     return json.loads(BASELINE.read_text(encoding="utf-8"))
 
 
 def four_digits(ratio):
-    """As many as are worth keeping, and showing."""
+    """The ratio to four digits, which is as exact as it is."""
     return float(f"{ratio:.4g}")
 
 
@@ -52,18 +52,18 @@ def change(kernel, ratio, ratios):
 
 
 def pytest_terminal_summary(terminalreporter, config):
-    """The table; and the baseline, where that is asked for."""
+    """Print the table; store the baseline with --store-ratios."""
     measured, baseline = config.stash[MEASURED], stored()
     if not measured:
         return
     line, ratios = terminalreporter.write_line, baseline["ratios"]
     terminalreporter.section("kernels beside their reference loops")
-    line(f"{'kernel':24} {'ns':>14} for a   {'ratio':>13}  against the baseline")
+    line(f"{'kernel':24} {'ns':>14} per     {'ratio':>13}  against the baseline")
     for row in measured:
         shown = f"{row['kernel']:24} {row['nanoseconds']:14,.1f} {row['item']:8}"
         ratio = four_digits(row["ratio"])
         line(f"{shown}{ratio:13,.1f}  {change(row['kernel'], ratio, ratios)}")
-    line(f"A ratio of 2 is the time of two steps of the loop. Baseline: {baseline['machine']}")
+    line(f"At a ratio of 2, an item takes as long as two steps. Baseline: {baseline['machine']}")
     if config.getoption("store_ratios"):
         found = {row["kernel"]: four_digits(row["ratio"]) for row in measured}
         new = {"machine": machine_lines()[-1], "ratios": ratios | found}

@@ -1,8 +1,9 @@
-"""The loop that kernels are measured beside. It never changes, or no ratio means anything.
+"""The loop that kernels are compared with. It must never change, or ratios could not be compared.
 
-A machine's other jobs slow down most what keeps all units of a core busy, as kernels do: so
-here four chains of integers and a polynomial wait for nothing but one another. Loops that wait
-for divisions or for memory were tried, and follow the kernels' ups and downs less well.
+Other jobs on a machine slow down most the code that keeps all units of a core busy, as kernels
+do. So this loop does, too: it has four chains of integers and a polynomial, which wait only for
+one another. Loops that wait for divisions or for memory were tried; their times follow those of
+the kernels less closely.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ TABLE = np.random.default_rng(0).random(1024)
 
 @njit(cache=True, error_model="numpy")
 def run_reference(table, steps):
-    """So many steps, a nanosecond or two each."""
+    """Run this many steps, which take one or two nanoseconds each."""
     a, b, c, d, total = uint64(1), uint64(2), uint64(3), uint64(4), 0.0
     for k in range(steps):
         x = table[k & 1023]

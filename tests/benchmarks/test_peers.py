@@ -251,7 +251,7 @@ def test_discs_alone_are_handed_over():
     round_one = Problem(surface, (0, 0), (10, 10), scenes.REGION, [Circle(5, 5, 1)], radius=0.5)
     assert discs_of(round_one).tolist() == [[5.0, 5.0, 1.5]]
     slope = Problem(surface, (0, 0), (10, 10), scenes.REGION, max_slope=30.0, name="steep")
-    with pytest.raises(InputError, match="steep: other programs are given no obstacles but discs"):
+    with pytest.raises(InputError, match="steep: programs in C\\+\\+ take no obstacles but discs"):
         discs_of(slope)
     with pytest.raises(InputError, match="no obstacles but discs"):
         discs_of(scenes.load("jacksboro"))

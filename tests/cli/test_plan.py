@@ -458,7 +458,7 @@ def test_ctrl_c_while_a_path_is_finished_loses_nothing(stage, tmp_path, capsys, 
     assert (answer["unrefined_length"] is None) == (stage == "refine")
     assert json.loads(files[0].read_text())["path"] == answer["path"]
     assert sorted(tmp_path.iterdir()) == sorted(files)
-    assert "no bound was proven" in captured.err
+    assert "no lower bound was proven" in captured.err
 
 
 def test_a_failure_while_a_path_is_finished_loses_nothing(capsys, monkeypatch):

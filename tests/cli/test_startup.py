@@ -57,7 +57,7 @@ def test_compiling_is_told_once_where_it_happens_and_somebody_watches(
 ):
     terminal = Terminal(watched)
     monkeypatch.setattr(sys, "stderr", terminal)
-    with console.compiling_told(quiet):
+    with console.compiling_announced(quiet):
         work()
     compile_two()  # which is nobody's business any more
     assert terminal.text.count("compiling kernels, once") == lines

@@ -95,7 +95,7 @@ def test_a_large_map_is_planned_on_in_a_corridor(dem, monkeypatch):
     found = tp.scenario.answer(asked).solution
     assert found.corridor is not None
     assert found.corridor.decimate == 2
-    with pytest.raises(tp.InputError, match="several goals needs it whole"):
+    with pytest.raises(tp.InputError, match="several goals needs the whole map"):
         tp.scenario.answer(tp.scenario.load("dem.tif", start=START, goal=[GOAL, START], **FAST))
 
 
@@ -194,13 +194,15 @@ def test_files_are_written_when_asked(dem, tmp_path):
         ({"output": "route.xyz"}, "no known format"),
         ({"output": "missing/route.csv"}, "cannot be written"),
         ({"plot": "dem.tif"}, "dem.tif"),
-        ({"certificate": "proof.npz", "bound": False}, "asks for a bound"),
+        ({"certificate": "proof.npz", "bound": False}, "--certificate needs a lower bound"),
         ({"all_goals": True}, "several goals"),
         ({"planner": "optimal", "refine": False}, "refines its routes"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_planned(options, words, dem, monkeypatch):
-    monkeypatch.setattr(answers, "asked", lambda scenario: pytest.fail("the map was opened"))
+    monkeypatch.setattr(
+        answers, "open_question", lambda scenario: pytest.fail("the map was opened")
+    )
     with pytest.raises(tp.TerrapathError, match=words):
         tp.scenario.answer(tp.scenario.load("dem.tif", start=START, goal=GOAL, **options))
 

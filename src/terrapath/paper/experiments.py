@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..planners import GeodesicTraversal, RRTStar
 from ..problem import scenes
 from ..surface import metric
+from ..validation import Point
 from .measures import FanSummary, FanTrial, PathTrial, PlannedPath, Sweep, SweepSummary, SweepTrial
 from .nonsmooth import SmoothedPath, smoothing_convergence
 from .runner import Runner
@@ -21,8 +22,8 @@ class Printed:
     """The numbers that the paper prints for a scene. Lengths are in map units."""
 
     rrt_star_r: float  # mean of RRT*-R
-    geodesic: float  # by geodesic traversal
-    directions: int  # of that traversal
+    geodesic: float  # length by geodesic traversal
+    directions: int  # number of rays of that traversal
     chord: float  # mean of the chord baseline
 
 
@@ -31,7 +32,7 @@ PRINTED = {
     "three-peaks": Printed(15.44211, 15.37167, 400, 16.1702),
     "six-peaks": Printed(17.18928, 17.02196, 600, 19.438),
 }
-# The length to which the paper's convergence experiment converges.
+# The length to which the paths of the paper's convergence experiment converge.
 PRINTED_LIMIT = 15.12566
 CONVERGENCE_SCENE = "three-peaks"
 REPEAT_SCENES = ("repeat-3d", "repeat-4d")
@@ -46,9 +47,9 @@ SECTOR = (-math.pi / 6.0, 2.0 * math.pi / 3.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Scale:
-    """How many samples and runs there are. The defaults are the paper's, where it gives them."""
+    """The numbers of samples and runs. The defaults are the paper's, where it gives them."""
 
-    samples: int = 10_000  # of a run
+    samples: int = 10_000  # in one run
     seeds: int = 10  # runs of a planner on a scene
     repeats: int = 150  # runs on each scene of the repeat experiment
     convergence_samples: tuple[int, ...] = tuple(range(2_000, 20_001, 2_000))
@@ -69,9 +70,9 @@ QUICK = Scale(
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """The settings of a reproduction. Trials take the seeds ``seed``, ``seed`` + 1, and so on."""
+    """The settings of a reproduction. Trials have the seeds ``seed``, ``seed`` + 1, and so on."""
 
-    scale: Scale = field(default=FULL)  # how much is run
+    scale: Scale = field(default=FULL)
     seed: int = 0
 
     def planner(self, run: int = 0, *, chord: bool = False, **options: Any) -> RRTStar:
@@ -97,7 +98,7 @@ class Settings:
 def _check_truth(scene: str, truth: FanSummary, lengths: Iterable[float]) -> None:
     """Raise InputError where a path is shorter than the shortest geodesic found.
 
-    Then the search for geodesics was too coarse.
+    In that case the search for geodesics was too coarse.
     """
     shortest = min(lengths)
     if shortest < truth.true_length * (1.0 - 1e-9):
@@ -109,7 +110,7 @@ def _check_truth(scene: str, truth: FanSummary, lengths: Iterable[float]) -> Non
 
 @dataclass(frozen=True)
 class StepEffect:
-    """What the planners find with one step."""
+    """The paths that the planners find with one step."""
 
     step: float  # map units
     rrt_star_r: list[PlannedPath]  # one for each seed
@@ -127,7 +128,7 @@ class SceneData:
     steps: list[StepEffect]  # one for each of STEPS
 
     def at(self, step: float) -> StepEffect:
-        """The runs with that step."""
+        """The runs with this step."""
         return next(effect for effect in self.steps if effect.step == step)
 
 
@@ -173,7 +174,7 @@ class ComparativeData:
         return [path for path in self.paths if path.planned_on == scene]
 
 
-def _compare(scene: str, points: Any) -> ComparedPath:
+def _compare(scene: str, points: Sequence[Point]) -> ComparedPath:
     height_only, with_resistance = scenes.load("four-peaks"), scenes.load("six-peaks")
     met = with_resistance.path(points).profile.values.max(axis=0)
     return ComparedPath(
@@ -186,7 +187,7 @@ def _compare(scene: str, points: Any) -> ComparedPath:
 
 
 def run_comparative(settings: Settings, runner: Runner) -> ComparativeData:
-    """The hills of six-peaks with and without resistance, each path under both metrics."""
+    """Plan over the hills of six-peaks with and without resistance; measure under both metrics."""
     names = ("four-peaks", "six-peaks")
     truths = runner.run("comparative, geodesics", [settings.truth(name) for name in names])
     trials = [t for name in names for t in settings.paths(name, settings.scale.seeds)]
@@ -254,7 +255,7 @@ class SensitivityData:
     scene: str
     truth: FanSummary  # of the search for the true length
     sweep: Sweep  # the rays
-    found: SweepSummary  # the movement of their ends
+    found: SweepSummary  # how far their ends move
 
 
 def run_sensitivity(settings: Settings, runner: Runner) -> list[SensitivityData]:
@@ -270,7 +271,7 @@ def run_sensitivity(settings: Settings, runner: Runner) -> list[SensitivityData]
 
 
 def run_smoothing(settings: Settings, runner: Runner) -> list[SmoothedPath]:
-    """Paths on smoothed edges and the exact ones. It takes seconds, so nothing is stored."""
+    """Compare paths on smoothed edges with exact ones. It takes seconds, so nothing is stored."""
     runner.watch("smoothing", 0, 1)
     found = smoothing_convergence()
     runner.watch("smoothing", 1, 1)
@@ -281,7 +282,7 @@ def _scene_runner(scene: str) -> Callable[[Settings, Runner], SceneData]:
     return lambda settings, runner: run_scene(scene, settings, runner)
 
 
-EXPERIMENTS: dict[str, Callable[[Settings, Runner], Any]] = {
+EXPERIMENTS: dict[str, Callable[[Settings, Runner], object]] = {
     **{scene: _scene_runner(scene) for scene in PRINTED},
     "comparative": run_comparative,
     "repeat": run_repeat,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,24 +27,27 @@ from .experiments import (
 )
 from .nonsmooth import SmoothedPath, by_surface
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 DOTS_PER_INCH = 130
 
 
-def new_figure(width: float, height: float) -> Any:
+def new_figure(width: float, height: float) -> Figure:
     """An empty matplotlib figure, inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save_figure(figure: Any, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a picture, completely or not at all."""
     with written_whole(path) as temporary:
         figure.savefig(temporary, dpi=DOTS_PER_INCH)
 
 
 def _solve(scene: str, settings: Settings, *, chord: bool = False) -> Solution:
-    """The first run again, this time with its tree."""
+    """Plan the first run again, to have its tree."""
     return settings.planner(chord=chord).solve(scenes.load(scene))
 
 
@@ -76,7 +79,7 @@ def draw_scene(data: SceneData, settings: Settings, directory: Path) -> list[Pat
 
 
 def draw_comparative(data: ComparativeData, settings: Settings, directory: Path) -> list[Path]:
-    """The path without resistance, on both surfaces; and the profiles of both paths."""
+    """The path planned without resistance, on both surfaces; and the profiles of both paths."""
     plain, full = _solve("four-peaks", settings), _solve("six-peaks", settings)
     assert plain.path is not None
     assert full.path is not None
@@ -107,7 +110,7 @@ def draw_comparative(data: ComparativeData, settings: Settings, directory: Path)
 
 
 def draw_repeat(data: list[RepeatData], settings: Settings, directory: Path) -> list[Path]:
-    """Box plots with the true length as a line."""
+    """Box plots of the lengths, with the true length as a line."""
     figure = new_figure(10.0, 5.0)
     for axes, runs in zip(figure.subplots(1, len(data)), data, strict=True):
         title = f"{runs.scene}, {len(runs.lengths)} runs"
@@ -179,6 +182,6 @@ DRAWERS: dict[str, Draw] = {
 }
 
 
-def draw(name: str, data: Any, settings: Settings, directory: Path) -> list[Path]:
+def draw(name: str, data: object, settings: Settings, directory: Path) -> list[Path]:
     """Draw an experiment's pictures into a directory and return their paths."""
     return DRAWERS.get(name, draw_scene)(data, settings, directory)

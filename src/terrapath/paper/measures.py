@@ -1,4 +1,4 @@
-"""What the trials measure: tree planners' paths, fans of geodesics, and how their ends move."""
+"""What trials measure: paths of tree planners, fans of geodesics, and how their ends move."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..planners import GeodesicTraversal, RRTStar
 from ..problem import Problem, Status
 from .trials import Trial
 
-# The angle between two rays that show how rays part, radians.
+# The angle between two neighbouring rays that show how fast rays move apart, radians.
 PAIR_ANGLE = math.radians(0.1)
 
 
 @dataclass(frozen=True)
 class PlannedPath:
-    """What a tree planner found. Lengths in map units."""
+    """A path that a tree planner found. Lengths are in map units."""
 
     length: float  # true length under h
     cost: float  # the planner's own measure of it
@@ -28,12 +28,12 @@ class PlannedPath:
 
 @dataclass(frozen=True)
 class PathTrial(Trial[PlannedPath]):
-    """A tree planner's path. Its seed is one of its options."""
+    """A run of a tree planner. The seed is one of the planner's options."""
 
     planner: RRTStar
 
     def measure(self) -> PlannedPath:
-        """Plan. Ctrl-C, which the planner answers with its best path so far, is passed on."""
+        """Plan. After Ctrl-C the planner returns its best path so far; here it is raised again."""
         solution = self.planner.solve(self.problem)
         if solution.status is Status.INTERRUPTED:
             raise KeyboardInterrupt
@@ -55,10 +55,10 @@ class ExactGeodesic:
 
 @dataclass(frozen=True)
 class FanSummary:
-    """What a traversal of geodesics found."""
+    """The result of a traversal of geodesics."""
 
     near: int  # rays that come within the radius of the goal
-    paper_length: float | None  # the paper's answer, map units
+    paper_length: float | None  # what the paper's method gives, map units
     geodesics: tuple[ExactGeodesic, ...]  # shortest first
 
     @property
@@ -84,7 +84,10 @@ class FanTrial(Trial[FanSummary]):
         """Trace the fan, and find all geodesics that end at the goal."""
         fan = self.planner.fan(self.problem)
         if not fan.geodesics:
-            raise InputError(f"{self.planner} hit no goal on {self.scene}; give more directions")
+            raise InputError(
+                f"{self.planner} found no geodesic to the goal of {self.scene}; "
+                "give more directions"
+            )
         length = None if fan.paper_length is None else float(fan.paper_length)
         return FanSummary(int(fan.near.sum()), length, tuple(map(_exact, fan.geodesics)))
 
@@ -99,7 +102,7 @@ class Sweep:
 
     @property
     def name(self) -> str:
-        """What the trials' files are called."""
+        """The beginning of the names of the trials' files."""
         return "sweep"
 
     def _ray(self, problem: Problem, angle: float) -> Ray:
@@ -125,7 +128,7 @@ class SweepSummary:
 
 @dataclass(frozen=True)
 class SweepTrial(Trial[SweepSummary]):
-    """End-point movement by direction, from the Jacobi field."""
+    """How far the ends of rays move with their directions, from the Jacobi field."""
 
     planner: Sweep
 

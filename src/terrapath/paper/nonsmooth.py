@@ -1,4 +1,4 @@
-"""The paper's open question: surfaces with edges, smoothed over smaller and smaller scales.
+"""A question that the paper leaves open: surfaces with edges, smoothed over ever smaller scales.
 
 Three sharp surfaces can be unrolled into the plane, so their geodesics are known in closed form: a
 cone, a square pyramid and a step. Each is smoothed, the shortest path on the smoothed surface is
@@ -60,9 +60,9 @@ class SmoothedPath:
 def _around_apex(
     name: str, height: Function, unroll: Turn, roll: Turn, start: Point, goal: Point
 ) -> SharpSurface:
-    """A surface that unrolls around an apex into a sheet of less than a full turn.
+    """A surface that can be unrolled around its apex into a flat sheet of less than a full turn.
 
-    The straight line on the sheet is the geodesic. It never meets the apex, because on one side the
+    The geodesic is the straight line on the sheet. It never meets the apex: on one side of it the
     angle between start and goal is less than half a turn on the sheet.
     """
     a, b = complex(*start), complex(*goal)
@@ -98,7 +98,7 @@ def cone(
 
 
 def _face_by_face(face: float, new_face: float, stretch: float) -> Turn:
-    """Map faces with one angle at the apex to faces with another, stretched along their middles."""
+    """Map each face to one with another angle at the apex, stretched along its middle line."""
 
     def turn(angle: Array) -> tuple[Array, Array]:
         k = np.round(angle / face)
@@ -145,11 +145,11 @@ def step(
     )
 
 
-# Shortest paths on them, smoothed
+# Shortest paths on the smoothed surfaces
 
 
 def smoothed_path(sharp: SharpSurface, scale: float) -> SmoothedPath:
-    """Smooth, and find the shortest path near the sharp surface's geodesic."""
+    """Smooth the surface, and find the shortest path near the geodesic of the sharp one."""
     surface = Surface.from_function(sharp.height, REGION, smoothing=scale)
     guess = sharp.true_path(np.linspace(0.0, 1.0, PIECES[0] + 1))
     path = shortest_polyline(surface, guess, PIECES)
@@ -185,5 +185,5 @@ def by_surface(found: Iterable[SmoothedPath]) -> dict[str, list[SmoothedPath]]:
 
 
 def observed_order(scales: Sequence[float], errors: Sequence[float]) -> float:
-    """The power of the scale that the errors fall with: the slope on logarithmic axes."""
+    """The power of the scale by which the errors fall: the slope on logarithmic axes."""
     return float(np.polyfit(np.log(scales), np.log(np.abs(errors)), 1)[0])

@@ -1,4 +1,4 @@
-"""The report in Markdown: the paper's numbers, ours and the true lengths side by side."""
+"""The report in Markdown: the paper's numbers, our numbers and the true lengths."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _length(value: float | None) -> str:
 
 
 def _excess(value: float | None, true_length: float) -> str:
-    """How much longer than the true length."""
+    """By how much a length exceeds the true length, in percent."""
     if value is None:
         return NOTHING
     # Adding 0 makes a rounded -0 a 0.
@@ -53,7 +53,7 @@ def markdown_table(
 
 
 def _spread(lengths: Sequence[float]) -> list[str]:
-    """Mean, least and largest."""
+    """The mean, the least and the largest length."""
     return [_length(float(np.mean(lengths))), _length(min(lengths)), _length(max(lengths))]
 
 
@@ -186,7 +186,7 @@ def _repeat_section(data: list[RepeatData], settings: Settings) -> list[str]:
 
 
 def _outside_sector(data: list[RepeatData]) -> list[str]:
-    """Scenes whose shortest geodesic the paper's traversal would not have found."""
+    """A line for each scene whose shortest geodesic the paper's traversal cannot find."""
     lines = []
     for runs in data:
         angle = float(np.degrees(runs.truth.geodesics[0].angle))
@@ -372,7 +372,7 @@ def machine_lines() -> list[str]:
     ]
 
 
-def make_report(found: Mapping[str, tuple[Any, Sequence[Path]]], settings: Settings) -> str:
+def make_report(found: Mapping[str, tuple[object, Sequence[Path]]], settings: Settings) -> str:
     """The report's text.
 
     found : for each experiment its data and its pictures. The same data give the same text.

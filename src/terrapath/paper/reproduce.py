@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 from .. import __version__
 from .._support.files import require_writable, written_whole
@@ -34,7 +33,7 @@ def chosen_experiments(what: str) -> list[str]:
     return [what]
 
 
-def claim(directory: Path, record: dict[str, Any]) -> None:
+def claim(directory: Path, record: dict[str, object]) -> None:
     """Make the output directory, or check that it belongs to a run with the same settings.
 
     Raises InputError where it does not, and MapError where it cannot be written.
@@ -60,7 +59,7 @@ def claim(directory: Path, record: dict[str, Any]) -> None:
         ) from None
 
 
-def _require_same(file: Path, record: dict[str, Any], belongs: str, remedy: str) -> None:
+def _require_same(file: Path, record: dict[str, object], belongs: str, remedy: str) -> None:
     try:
         other = json.loads(file.read_text(encoding="utf-8"))
     except ValueError:
@@ -70,8 +69,8 @@ def _require_same(file: Path, record: dict[str, Any], belongs: str, remedy: str)
     if not isinstance(other, dict):
         raise InputError(f"{belongs} a run whose {SETTINGS_FILE} cannot be read; {remedy}")
     shown = ", ".join(f"{name}={other.get(name)!r}" for name in record)
-    asked = ", ".join(f"{name}={value!r}" for name, value in record.items())
-    raise InputError(f"{belongs} a run with {shown}, not {asked}; {remedy}")
+    wanted = ", ".join(f"{name}={value!r}" for name, value in record.items())
+    raise InputError(f"{belongs} a run with {shown}, not {wanted}; {remedy}")
 
 
 def reproduce(
@@ -83,11 +82,11 @@ def reproduce(
     workers: int | None = None,
     watch: Watch = watch_nothing,
 ) -> Path:
-    """Run experiments of the paper, draw them and report them.
+    """Run experiments of the paper, draw their figures and write a report.
 
-    what : "all" or one of ``EXPERIMENTS``. output : directory; a run that was stopped there is
-    continued. quick : fewer samples and runs. seed : of the first trial. workers : processes; by
-    default one for each core. watch : is shown the progress. Returns the report's path.
+    what : "all" or one of ``EXPERIMENTS``. output : a directory; a run that was stopped there
+    continues. quick : fewer samples and runs. seed : of the first trial. workers : the number of
+    processes; by default one for each core. watch : gets the progress. Returns the report's path.
     Raises InputError where the directory belongs to a run with other settings, MapError where it
     cannot be written.
     """

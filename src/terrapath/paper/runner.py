@@ -7,17 +7,16 @@ import os
 import signal
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from types import TracebackType
-from typing import Any
 
 from .._support.watching import Watch, watch_nothing
 from .trials import Result, Store, Trial
 
-# Held while a result is written, so that a worker that must end leaves no half file.
+# Held while a result is written, so that a worker that is told to end finishes the file first.
 _SAVING = threading.Lock()
 
 
@@ -36,18 +35,18 @@ def _end_when_closed(lifeline: Connection) -> None:
 
 
 def _prepare_worker(lifeline: Connection) -> None:
-    """Leave Ctrl-C to the parent; the worker ends when the parent gives up or is killed."""
+    """Leave Ctrl-C to the parent; the worker ends when the parent closes the pipe or is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_when_closed, args=(lifeline,), daemon=True).start()
 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Hold back Ctrl-C; on POSIX, processes that are started meanwhile ignore it."""
+    """Delay Ctrl-C; on POSIX, processes that are started meanwhile ignore it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # It is started first, because its start would let Ctrl-C through again.
+    # The resource tracker is started first, because its start would allow Ctrl-C again.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -59,8 +58,8 @@ def _interrupts_held() -> Iterator[None]:
 class Runner:
     """Runs trials, or loads their results from the store. It is a context manager.
 
-    workers : number of processes; with 1 the trials run in this one. watch : is shown the progress.
-    A trial that fails ends the run, and so does Ctrl-C; finished trials stay stored.
+    workers : the number of processes; with 1, the trials run in this one. watch : gets the
+    progress. A trial that fails ends the run, and so does Ctrl-C; finished trials stay stored.
     """
 
     def __init__(self, store: Store, workers: int, watch: Watch = watch_nothing) -> None:
@@ -104,7 +103,7 @@ class Runner:
         return [found[trial] for trial in trials]
 
     def _measure(self, trials: list[Trial[Result]]) -> Iterator[tuple[Trial[Result], Result]]:
-        """Trials with their results, in the order in which they are done."""
+        """Trials with their results, in the order in which they finish."""
         if self.workers == 1:
             for trial in trials:
                 yield trial, _measure_and_save(trial, self.store)
@@ -113,7 +112,7 @@ class Runner:
             return
         with _interrupts_held():
             pool = self._started_pool()
-            futures: dict[Any, Trial[Result]] = {
+            futures: dict[Future[Result], Trial[Result]] = {
                 pool.submit(_measure_and_save, trial, self.store): trial for trial in trials
             }
         for future in as_completed(futures):

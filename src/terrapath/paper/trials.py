@@ -1,4 +1,4 @@
-"""Trials: runs whose settings determine the result, and the files that store results."""
+"""Trials: runs whose result depends on their settings alone, and the files of results."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from ..problem import Problem, scenes
 Result = TypeVar("Result")
 
 
-def canonical(record: Any) -> str:
-    """JSON that is the same text for the same content."""
+def canonical(record: object) -> str:
+    """The record as JSON; the same content always gives the same text."""
     return json.dumps(record, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
-def digest(record: Any) -> str:
-    """A hash of a record's content, 64 hexadecimal digits; it is the same in every process."""
+def digest(record: object) -> str:
+    """A hash of a record's content, 64 hexadecimal digits; the same in every process."""
     return hashlib.sha256(canonical(record).encode()).hexdigest()
 
 
 def rebuilt(kind: Any, record: Any) -> Any:
-    """The object that ``dataclasses.asdict`` made a record of, from the record's JSON.
+    """The object again, from the JSON of its ``dataclasses.asdict``.
 
-    kind : a dataclass. Its fields are numbers, texts, dataclasses, tuples of one of these, or one
-    of these or None.
+    kind : the object's class, a dataclass. Its fields are numbers, texts, dataclasses, tuples of
+    one of these types, or one of these or None.
     """
     if record is None:
         return None
@@ -49,8 +49,8 @@ def rebuilt(kind: Any, record: Any) -> Any:
 
 
 @cache
-def _scene_settings(name: str) -> dict[str, Any]:
-    """All numbers that define a scene, so that a changed scene has other trials."""
+def _scene_settings(name: str) -> dict[str, object]:
+    """All numbers that define a scene, so that results of a changed scene are not used."""
     problem = scenes.load(name)
     data = {field: array.tolist() for field, array in problem.surface.data._asdict().items()}
     return {
@@ -64,10 +64,10 @@ def _scene_settings(name: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Trial(ABC, Generic[Result]):
-    """One planner on one scene: all that the result depends on.
+    """One planner on one scene: everything that the result depends on.
 
-    scene : its name. planner : a dataclass with a name. The result is a dataclass; a subclass names
-    it in ``Trial[...]``.
+    scene : the scene's name. planner : a dataclass with a ``name``. The result is a dataclass; a
+    subclass gives its type in ``Trial[...]``.
     """
 
     scene: str
@@ -94,7 +94,7 @@ class Trial(ABC, Generic[Result]):
 
     @property
     def key(self) -> str:
-        """Name of the trial's file: readable, and unique to its settings."""
+        """The name of the trial's file: readable, and different for different settings."""
         return f"{self.scene}-{self.planner.name}-{digest(self.settings)[:32]}"
 
     @abstractmethod
@@ -108,7 +108,7 @@ class Trial(ABC, Generic[Result]):
 
 
 class Store:
-    """The finished trials of a directory, one small file each."""
+    """The finished trials in a directory, one small file for each."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
@@ -136,6 +136,6 @@ class Store:
             temporary.write_text(sealed + "\n", encoding="utf-8")
 
 
-def _plain(record: Any) -> Any:
-    """A record as it is read back from its file."""
+def _plain(record: object) -> object:
+    """The record as it would be read from its file."""
     return json.loads(canonical(record))
