@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from .option import Declared, declared
@@ -14,8 +14,6 @@ from .sections import LayerTable
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
     from pydantic.json_schema import JsonSchemaValue
-    from pydantic_core import ErrorDetails
-    from pydantic_core.core_schema import NullableSchema, WithDefaultSchema
 
 # Longer values are cut in messages, characters.
 MOST_SHOWN = 60
@@ -49,10 +47,10 @@ def scenario_schema() -> dict[str, Any]:
     class Schema(GenerateJsonSchema):
         """A schema without null, which TOML does not have: a key may be left out instead."""
 
-        def nullable_schema(self, schema: NullableSchema) -> JsonSchemaValue:
+        def nullable_schema(self, schema: Any) -> JsonSchemaValue:
             return self.generate_inner(schema["schema"])
 
-        def default_schema(self, schema: WithDefaultSchema) -> JsonSchemaValue:
+        def default_schema(self, schema: Any) -> JsonSchemaValue:
             if schema.get("default", ()) in (None, ()):
                 return self.generate_inner(schema["schema"])
             return super().default_schema(schema)
@@ -73,7 +71,7 @@ def validated(data: dict[str, Any]) -> Scenario:
         raise WrongValueError(*_explained(errors[0], data)) from None
 
 
-def _explained(error: ErrorDetails, data: dict[str, Any]) -> tuple[tuple[str, ...], str]:
+def _explained(error: Mapping[str, Any], data: dict[str, Any]) -> tuple[tuple[str, ...], str]:
     """The keys at which one of pydantic's errors is, and what is wrong there, in words."""
     keys = _keys_of(error["loc"], data)
     if error["type"] == UNKNOWN:
