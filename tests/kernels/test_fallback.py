@@ -10,7 +10,7 @@ import pytest
 from numba import config
 from numba.core.errors import TypingError
 
-from common import ROOT
+from common import ROOT, mostly_slow
 from kernel_copies import copy_machinery
 from processes import in_another_process
 from terrapath._kernels import fallback
@@ -152,8 +152,9 @@ BROKEN = {
 }
 
 
-@pytest.mark.parametrize(("before", "reason"), BROKEN.values(), ids=BROKEN)
-def test_whatever_of_numba_has_changed_the_answers_are_the_same(before, reason, use):
+@pytest.mark.parametrize("broken", mostly_slow(BROKEN, quick=3))
+def test_whatever_of_numba_has_changed_the_answers_are_the_same(broken, use):
+    before, reason = BROKEN[broken]
     found, plain, told, statistics = use(before)
     assert (found, plain) == (EXPECTED, True)
     (line,) = told
