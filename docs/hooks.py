@@ -2,6 +2,7 @@
 
 import posixpath
 import re
+from pathlib import Path
 
 from mkdocs.structure.files import File
 
@@ -16,10 +17,10 @@ LINK = re.compile(r"\]\((?![a-z]+:|#)([^)#\s]+)")
 
 
 def on_files(files, config):
-    root = posixpath.dirname(config.config_file_path)
+    root = Path(config.config_file_path).parent
     for source, page in OUTSIDE.items():
-        with open(posixpath.join(root, source), encoding="utf-8") as file:
-            files.append(File.generated(config, page, content=file.read()))
+        content = (root / source).read_text(encoding="utf-8")
+        files.append(File.generated(config, page, content=content))
     return files
 
 

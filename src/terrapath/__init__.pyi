@@ -4,20 +4,24 @@ from .certificates.certificate import Certificate as Certificate
 from .certificates.search import lower_bound as lower_bound
 from .distance.field import DistanceField as DistanceField, distance_field as distance_field
 from .errors import (
+    BlockedError as BlockedError,
     CertificateError as CertificateError,
     FitError as FitError,
     InputError as InputError,
+    KernelWarning as KernelWarning,
     MapError as MapError,
     MissingExtraError as MissingExtraError,
     OutsideSurfaceError as OutsideSurfaceError,
+    RepairedWarning as RepairedWarning,
     TerrapathError as TerrapathError,
+    TerrapathWarning as TerrapathWarning,
+    UnfinishedWarning as UnfinishedWarning,
+    VectorWarning as VectorWarning,
 )
 from .geodesics.alternatives import alternatives as alternatives
 from .geodesics.refinement import refine as refine
 from .io import (
     LayerSource as LayerSource,
-    RepairedWarning as RepairedWarning,
-    VectorWarning as VectorWarning,
     read_area as read_area,
     read_obstacles as read_obstacles,
     read_surface as read_surface,

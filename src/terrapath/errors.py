@@ -58,6 +58,14 @@ class KernelWarning(TerrapathWarning, RuntimeWarning):
     """Kernels are compiled more slowly or more often than they could be."""
 
 
+class VectorWarning(TerrapathWarning):
+    """A vector file was not used exactly as it is: something was assumed, or left out."""
+
+
+class RepairedWarning(VectorWarning):
+    """Geometries of a vector file were not valid, and were repaired."""
+
+
 class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded. It is left out, or returned as it was before."""
 

@@ -1,7 +1,5 @@
 """Ground without data, rounded heights, and costs beside them."""
 
-import inspect
-
 import numpy as np
 import pytest
 import rasterio
@@ -160,8 +158,6 @@ def test_a_cost_that_is_not_above_0_is_named_with_its_place(tmp_path, wrong):
 
 
 def test_costs_stay_within_their_range_on_any_grid_and_beside_holes(tmp_path):
-    if "kinds" not in inspect.signature(tp.Surface.from_grid).parameters:
-        pytest.skip("the core has no cost layers yet")
     random = np.random.default_rng(4)
     dem = write(tmp_path / "dem.tif", HEIGHTS)
     for name, transform, size in (

@@ -139,7 +139,7 @@ def test_a_scenario_of_version_0_1_is_read(dem, tmp_path):
     [
         ({"sampels": 3}, ("'sampels'", "did you mean samples?")),
         ({"neighbors": 8}, ("'neighbors'", "did you mean neighbours?")),
-        ({"xyzzy": 8}, ("'xyzzy'", "choose one of path, scene")),
+        ({"xyzzy": 8}, ("'xyzzy'", "choose one of height_band, fill_holes")),
         ({"samples": "3"}, ("samples in [planner] is '3'", "a whole number is expected")),
         ({"start": 3}, ("start in [route] is 3", "two finite numbers, [X, Y] is expected")),
         ({"start": (np.nan, 0)}, ("start in [route] is [nan, 0]", "two finite numbers")),

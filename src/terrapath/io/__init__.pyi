@@ -8,4 +8,3 @@ from .maps import (
 from .routes import write_route as write_route
 from .routes.record import route_record as route_record
 from .vectors import read_area as read_area, read_obstacles as read_obstacles
-from .vectors.layers import RepairedWarning as RepairedWarning, VectorWarning as VectorWarning

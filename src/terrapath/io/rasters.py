@@ -14,6 +14,7 @@ from pyproj import CRS
 from rasterio import Affine
 
 from .._support.extras import require_packages
+from .._support.files import is_there
 from ..errors import MapError, TerrapathError, silence
 from ..surface.georeference import parse_crs
 from ..surface.raster import Grid
@@ -59,7 +60,7 @@ def reading(path: str | Path, *, is_file: bool = True) -> Iterator[None]:
 
 def _unreadable(path: str | Path, error: Exception, *, is_file: bool) -> MapError:
     # Checked only after an error: GDAL also reads names that are no paths, as in /vsizip/.
-    if is_file and not _may_be_no_path(str(path)) and not _exists(path):
+    if is_file and not _may_be_no_path(str(path)) and not is_there(Path(path)):
         return MapError(f"{path} does not exist; check the path")
     # Rasterio's own message only refers to the cause, which holds the reason.
     reason = " ".join(str(error.__cause__ or error).split()).rstrip(".") or type(error).__name__
@@ -70,13 +71,6 @@ def _unreadable(path: str | Path, error: Exception, *, is_file: bool) -> MapErro
 
 def _may_be_no_path(name: str) -> bool:
     return name.startswith("/vsi") or re.match(r"[A-Za-z0-9_+]{2,}:", name) is not None
-
-
-def _exists(path: str | Path) -> bool:
-    try:
-        return Path(path).exists()
-    except (OSError, ValueError):
-        return False
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,10 +72,10 @@ class Problem:
         self.goal = self.checked(goal, "goal")
 
     def _free_space(self) -> FreeSpace:
-        limits = (self.obstacles, self.surface.nodata, self.max_slope, self.keep_in)
-        if all(limit is None or limit == () for limit in limits):
-            return FreeSpace(self.bounds)  # all of the bounds
-        return self.constraints.free_space()
+        limits = (self.surface.nodata, self.max_slope, self.keep_in)
+        if self.obstacles or any(limit is not None for limit in limits):
+            return self.constraints.free_space()
+        return FreeSpace(self.bounds)  # all of the bounds
 
     @cached_property
     def constraints(self) -> Constraints:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from .option import Declared, declared
@@ -128,13 +128,13 @@ def _nearest(key: str, known: list[str]) -> str:
     return f"did you mean {near[0]}?" if near else f"choose one of {', '.join(known)}"
 
 
-def nearest_keyword(keyword: str) -> str:
+def nearest_keyword(keyword: str, known: Collection[Declared]) -> str:
     """What an unknown keyword argument may have been meant to be, in words."""
-    words = {word: entry.keyword for entry in options() for word in _words(entry)}
+    words = {word: entry.keyword for entry in known for word in _words(entry)}
     near = difflib.get_close_matches(keyword, words, n=1)
     if near:
         return f"did you mean {words[near[0]]}?"
-    return f"choose one of {', '.join(entry.keyword for entry in options())}"
+    return f"choose one of {', '.join(entry.keyword for entry in known)}"
 
 
 def _nearest_option(key: str, section: str) -> str:

@@ -10,6 +10,9 @@ from .option import Files
 from .scenario import Given, Scenario, options
 from .sections import MapSection
 
+# The map is named by itself, and how an answer is printed is the command's matter.
+_NO_KEYWORDS = {"path", "scene", "json", "quiet"}
+
 
 def load(where: str | Path, **given: object) -> Scenario:
     """A question to Terrapath, ready for ``answer``.
@@ -68,11 +71,13 @@ def _checked(given: Mapping[str, object]) -> Given:
     """Keyword arguments as checked values by section and key."""
     from .checked import WrongValueError, nearest_keyword, validated
 
-    known = {entry.keyword: entry for entry in options()}
+    known = {entry.keyword: entry for entry in options() if entry.keyword not in _NO_KEYWORDS}
     values: dict[str, dict[str, object]] = {}
     for keyword, value in given.items():
         if keyword not in known:
-            raise InputError(f"there is no option {keyword!r}; {nearest_keyword(keyword)}")
+            raise InputError(
+                f"there is no option {keyword!r}; {nearest_keyword(keyword, known.values())}"
+            )
         entry = known[keyword]
         several = entry.type == Files and isinstance(value, str | Path)
         values.setdefault(entry.section, {})[entry.key] = _plain([value] if several else value)

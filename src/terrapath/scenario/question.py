@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .._support.files import is_there
 from ..errors import InputError
 from .option import Point, Rectangle
 from .scenario import Scenario
@@ -79,7 +80,7 @@ def _sources(tables: dict[str, LayerTable]) -> dict[str, LayerSource]:
 def require_map(name: str) -> None:
     """Raise InputError for a name that cannot be a map's, and so was meant to be a scene's."""
     path = Path(name)
-    if not path.exists() and not path.suffix and ":" not in name:
+    if not is_there(path) and not path.suffix and ":" not in name:
         from ..problem.scenes import names
 
         raise InputError(f"{name!r} is neither a built-in scene ({', '.join(names())}) nor a file")

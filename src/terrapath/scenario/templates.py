@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, MapError, OutsideSurfaceError
+from ..errors import MapError
 from ..planners.corridor import factor
-from ..problem import Problem
 from ..problem.scenes import SCENES, load
+from ..space.free_space import FreeSpace
 from ..surface import Surface
 from .answers import MOST_CELLS
 from .option import Declared, Point, declared
@@ -123,20 +123,20 @@ def _guess(surface: Surface) -> tuple[Point, Point]:
         (bounds.x1_min + u * bounds.width, bounds.x2_min + v * bounds.height)
         for v, u in itertools.product(along, along)
     ]
-    free = [place for place in (_rounded(surface, p) for p in places) if _is_free(surface, place)]
-    pairs = itertools.combinations(free, 2)
-    for start, goal in sorted(pairs, key=lambda pair: -np.hypot(*np.subtract(*pair))):
-        if not Problem(surface, start, goal).is_unreachable:
-            return start, goal
-    raise MapError("no two free places of the map could be found that a path connects")
-
-
-def _is_free(surface: Surface, place: Point) -> bool:
-    try:
-        Problem(surface, place, place)
-    except (InputError, OutsideSurfaceError):
-        return False
-    return True
+    space = FreeSpace(bounds, [] if surface.nodata is None else [surface.nodata])
+    connected: list[list[Point]] = []
+    for place in (_rounded(surface, place) for place in places):
+        if not bounds.contains(np.array(place)) or space.blocker(place) is not None:
+            continue
+        group = next((g for g in connected if not space.separates(g[0], place)), None)
+        if group is None:
+            connected.append([place])
+        else:
+            group.append(place)
+    pairs = [pair for group in connected for pair in itertools.combinations(group, 2)]
+    if not pairs:
+        raise MapError("no two free places of the map could be found that a path connects")
+    return max(pairs, key=lambda pair: np.hypot(*np.subtract(*pair)))
 
 
 def _digits(surface: Surface) -> int:

@@ -156,8 +156,8 @@ def _line_of(text: str, keys: tuple[str, ...]) -> int | None:
         end, data = read_to(middle)
         if _holds(data, keys):
             high = end
-        elif end == low or attempts < 0:
-            low = middle if attempts >= 0 else high
+        elif attempts < 0:
+            return None
         else:
             low = middle
     return None if attempts < 0 else _first_of_statement(lines, high)

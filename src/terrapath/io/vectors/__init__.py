@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from ...errors import MapError, tell
+from ...errors import MapError, VectorWarning, tell
 from ...surface.bounds import Bounds
-from .layers import VectorWarning, read_layers
+from .layers import read_layers
 from .plane import Plane, Where, placed
 
 

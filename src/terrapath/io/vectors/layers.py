@@ -15,19 +15,12 @@ from pyproj.exceptions import CRSError
 from shapely.geometry.base import BaseGeometry
 
 from ..._support.extras import require_packages
-from ...errors import MapError, TerrapathWarning, silence, tell
+from ..._support.files import is_there
+from ...errors import MapError, RepairedWarning, VectorWarning, silence, tell
 from ...space.free_space import Geometries, Indices, simple_parts
 
 FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30
-
-
-class VectorWarning(TerrapathWarning):
-    """A vector file was not used exactly as it is: something was assumed, or left out."""
-
-
-class RepairedWarning(VectorWarning):
-    """Geometries of a vector file were not valid, and were repaired."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +51,10 @@ def read_layers(path: Path) -> Iterator[Layer]:
 def _listed(path: Path) -> tuple[Path, list[str]]:
     """The file, and the names of the layers to read."""
     source, wanted = path, ""
-    if not path.exists():
+    if not is_there(path):
         file, _, wanted = str(path).rpartition(":")
         source = Path(file)
-        if not file or not source.exists():
+        if not file or not is_there(source):
             raise MapError(f"{path} does not exist; check the path")
     _refuse_absurd_sizes(source)
     require_packages(f"reading {source}", "pyogrio")

@@ -13,7 +13,7 @@ from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 from shapely.geometry.base import BaseGeometry
 
-from ...errors import InputError, MapError, tell
+from ...errors import InputError, MapError, VectorWarning, tell
 from ...space.free_space import POINTS, Geometries, outlines, simple_parts
 from ...surface import Surface
 from ...surface.bounds import Bounds
@@ -21,7 +21,6 @@ from ...surface.georeference import Georeference
 from ...validation import Array
 from .layers import (
     Layer,
-    VectorWarning,
     quietly,
     reason_of,
     repaired,
