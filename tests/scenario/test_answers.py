@@ -175,6 +175,9 @@ def test_the_help_names_the_defaults_of_the_planners():
             assert float(text.partition("]")[0]) == getattr(planner, entry.key), entry.key
             told += 1
     assert told == 7
+    wide = next(entry for entry in options("planner") if entry.key == "corridor").option.help
+    assert f"over {answers.MOST_CELLS // 10**6} million cells" in wide
+    assert f"{corridor.HALF_WIDTH:g} coarse cells" in wide
 
 
 # Outputs
