@@ -144,8 +144,9 @@ def test_links_lead_somewhere(page):
 
 def test_the_reference_holds_the_public_face_and_nothing_else():
     pages = "\n".join(page.read_text() for page in REFERENCE)
-    names = re.findall(r"^::: terrapath\.(\w+)$", pages, re.MULTILINE)
-    assert sorted(names) == sorted({*tp.__all__} - {"__version__"})
+    names = re.findall(r"^::: terrapath\.([\w.]+)$", pages, re.MULTILINE)
+    scenario = {f"scenario.{name}" for name in tp.scenario.__all__}
+    assert sorted(names) == sorted({*tp.__all__} - {"__version__", "scenario"} | scenario)
 
 
 def test_there_are_examples():

@@ -11,6 +11,7 @@ EXTRA_OF = {
     "pyogrio": "vector",
     "xarray": "xarray",
     "h5netcdf": "xarray",
+    "h5py": "xarray",
     "sympy": "expressions",
     "plotly": "page",
     "gpxpy": "gpx",

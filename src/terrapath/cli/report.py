@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 # At most this many of a planner's alternative routes are shown.
 MOST_ALTERNATIVES = 5
 
+# A gap above this share says that the route may be far from the shortest.
+LARGE_GAP = 0.05
+
 
 def _amount(value: float, unit: str) -> str:
     """A number with its unit: three digits after the point from 1,000 on, six below."""
@@ -28,8 +31,10 @@ def _amount(value: float, unit: str) -> str:
     return f"{value:{digits}} {unit}".rstrip()
 
 
-def _gap(gap: float, target: float | None) -> str:
-    """The gap, and whether it meets the target where there is one."""
+def _gap(gap: float, target: float | None, planner: str) -> str:
+    """The gap, whether it meets the target where there is one, and what may help if it is large."""
+    if target is None and gap > LARGE_GAP and planner != "optimal":
+        return f"{percent(gap)}; --planner optimal may find a shorter route, or a better bound"
     if target is None:
         return percent(gap)
     met = "is met" if gap <= target else "is not met"
@@ -65,7 +70,7 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
     yield "true length", _amount(length, unit)
     if solution.lower_bound is not None and solution.gap is not None:
         yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bound_in_words}"
-        yield "gap", _gap(solution.gap, target_gap)
+        yield "gap", _gap(solution.gap, target_gap, solution.planner)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
     assert solution.cost is not None

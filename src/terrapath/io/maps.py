@@ -51,7 +51,7 @@ class LayerSource:
 
     @classmethod
     def parse(cls, text: str) -> LayerSource:
-        """From text of the form FILE[:BAND][*WEIGHT]."""
+        """From text of the form ``FILE[:BAND][*WEIGHT]``."""
         match = _TEXT.fullmatch(text)
         try:
             if match is None:
@@ -340,7 +340,7 @@ def read_surface(
 
     source : anything GDAL reads, an xarray DataArray or Dataset, or (values, x, y).
     height_band : its band of heights, 1-based, or the name of a variable.
-    layers, costs : name -> LayerSource, path, array or text FILE[:BAND][*WEIGHT]; resampled to
+    layers, costs : name -> LayerSource, path, array or text ``FILE[:BAND][*WEIGHT]``; resampled to
     the grid of the heights. A change of one of ``layers`` costs. The value of one of ``costs``
     multiplies lengths, and must be above 0.
     fill_holes : holes up to this side are filled, map units of the plane; all other cells

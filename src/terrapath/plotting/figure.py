@@ -14,7 +14,7 @@ from ..errors import MapError
 from ..problem import Solution
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
-from .labels import format_length, in_words
+from .labels import format_length, in_words, straight_name
 from .map_view import draw_map
 from .perspective import draw_perspective
 
@@ -34,7 +34,10 @@ def _title(solution: Solution) -> str:
         return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
     straight = solution.straight_length
     saved = 1.0 - length / straight if straight else 0.0
-    against = f"{abs(saved):.1%} {'shorter' if saved >= 0.0 else 'longer'} than the straight line"
+    against = (
+        f"{100.0 * abs(saved):.1f} % {'shorter' if saved >= 0.0 else 'longer'} than the "
+        f"{straight_name(solution)}"
+    )
     refined = "" if solution.unrefined is None else ", refined"
     title = (
         f"{name}{solution.planner}{refined}, length {format_length(length, unit)} "
@@ -50,10 +53,12 @@ def _title(solution: Solution) -> str:
 def draw_route(solution: Solution) -> Any:
     """A matplotlib figure: the map with tree and path, and beside it the surface in 3-D."""
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     bounds = solution.problem.bounds
     height = float(np.clip(PANEL_WIDTH * bounds.height / bounds.width, 3.8, 8.0)) + 1.2
-    figure = Figure(figsize=(14.0, height), layout="constrained")
+    # The layout is made for axes of any shape; a map's aspect then moves its labels a little.
+    figure = Figure(figsize=(14.0, height), layout=ConstrainedLayoutEngine(h_pad=0.16))
     panels = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.05))
     draw_map(figure.add_subplot(panels[0]), solution)
     draw_perspective(figure.add_subplot(panels[1], projection="3d"), solution)
@@ -71,7 +76,7 @@ def draw_field(field: DistanceField) -> Any:
     draw_distances(figure.add_subplot(), field)
     reached = field.values[np.isfinite(field.values)]
     farthest = format_length(float(reached.max(initial=0.0)), field.surface.unit)
-    start = ", ".join(f"{coordinate:.6g}" for coordinate in field.source)
+    start = ", ".join(f"{coordinate:.10g}" for coordinate in field.source)
     figure.suptitle(f"distance from ({start}), at most {farthest}", fontsize=12)
     return figure
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from ..io.routes.profile import clean
-from ..problem import Problem
+from ..problem import Problem, Solution
 
 # Longer axes are in kilometres; metres.
 LONGEST_IN_METRES = 10_000.0
@@ -26,6 +26,11 @@ def format_length(length: float, unit: str) -> str:
     return f"{length:{'.4f' if length < 1000.0 else ',.0f'}} {unit}".rstrip()
 
 
+def straight_name(solution: Solution) -> str:
+    """What the straight lines from stop to stop are called."""
+    return "straight legs" if solution.legs else "straight line"
+
+
 class AxisUnit(NamedTuple):
     """The unit of an axis of lengths."""
 
@@ -40,16 +45,15 @@ class AxisUnit(NamedTuple):
 
     def format(self, length: float, place: int | None = None) -> str:
         """The number that the axis shows for a length in map units; matplotlib gives ``place``."""
-        return f"{length / self.size:g}"
+        return f"{length / self.size:.10g}"
 
     def label(self, name: str) -> str:
         """The axis label."""
         return f"{name} ({self.name})" if self.name else name
 
     def apply(self, axis: Any) -> None:
-        """Show the numbers of an axis in this unit instead of map units."""
-        if self.size != 1.0:
-            axis.set_major_formatter(self.format)
+        """Show the numbers of an axis in this unit, all digits of them."""
+        axis.set_major_formatter(self.format)
 
 
 def label_axes(axes: Any, problem: Problem) -> None:

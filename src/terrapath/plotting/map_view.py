@@ -15,7 +15,7 @@ from shapely import LineString, Point, Polygon
 
 from ..problem import Problem, Solution
 from ..space.free_space import Parts, sort_obstacles
-from .labels import format_length, label_axes
+from .labels import format_length, label_axes, straight_name
 from .terrain import LAYER_COLOURS, Cells, Terrain, height_colours
 
 SAMPLES = 500
@@ -24,6 +24,7 @@ LAYER_CONTOURS = 5
 # In samples. Without it, contours of a layer with rounded values would follow every step of it.
 LAYER_SMOOTHING = 8.0
 PATH_COLOUR = "#e4002b"
+VIA_COLOUR = "#0b3d91"
 # Colours of the next best routes; more of them are not drawn.
 ALTERNATIVE_COLOURS = ("#0b3dff", "#8a2be2", "#d95f02", "#00868b", "#6b4226")
 MARKS = {"markeredgecolor": "white", "markeredgewidth": 1.2, "ls": "none", "zorder": 6}
@@ -140,11 +141,10 @@ def _draw_path(axes: Any, solution: Solution) -> None:
     problem = solution.problem
     halo = [patheffects.withStroke(linewidth=4.6, foreground="white")]
     if solution.path is not None:
-        straight = np.array([problem.start, problem.goal])
         # White is visible on dark ground; the outline is, on bright ground and in the legend.
         outline = [patheffects.withStroke(linewidth=3.2, foreground="#303030")]
         style = {"color": "white", "lw": 1.6, "ls": (0, (4, 3)), "path_effects": outline}
-        axes.plot(*straight.T, zorder=4, label="straight line", **style)
+        axes.plot(*solution.stops.T, zorder=4, label=straight_name(solution), **style)
         _draw_alternatives(axes, solution)
         axes.plot(
             *solution.path.points.T,
@@ -156,6 +156,8 @@ def _draw_path(axes: Any, solution: Solution) -> None:
             label="route",
         )
     draw_ends(axes, problem)
+    if len(solution.via):
+        axes.plot(*solution.via.T, "D", color=VIA_COLOUR, ms=7, label="via", **MARKS)
 
 
 def _draw_alternatives(axes: Any, solution: Solution) -> None:

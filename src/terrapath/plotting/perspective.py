@@ -9,6 +9,7 @@ import numpy.typing as npt
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import QuadMesh
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import proj3d
 
 from ..problem import Solution
@@ -122,7 +123,7 @@ def draw_perspective(axes: Any, solution: Solution) -> None:
     # The label is above the corner of its axis: beside it are the numbers and the picture's edge.
     above = high + 0.25 * (high - low)
     axes.text(bounds.x1_min, bounds.x2_max, above, terrain.label(0), ha="center", va="bottom")
-    axes.zaxis.set_major_locator(_few_ticks())
+    axes.zaxis.set_major_locator(MaxNLocator(4))
     cmap = height_colours() if layer == 0 else colormaps[LAYER_COLOURS]
     if layer == 1:
         scale = ScalarMappable(terrain.norm(layer), cmap)
@@ -142,9 +143,3 @@ def _tint(colours: Array, cells: npt.NDArray[np.bool_], tone: tuple[float, ...])
     """Put a translucent colour over some cells of the ground."""
     *tint, opacity = tone
     colours[cells] = (1.0 - opacity) * colours[cells] + opacity * np.array(tint)
-
-
-def _few_ticks() -> Any:
-    from matplotlib.ticker import MaxNLocator
-
-    return MaxNLocator(4)

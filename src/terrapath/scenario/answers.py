@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, TerrapathWarning, collecting
@@ -110,12 +111,19 @@ def field(scenario: Scenario) -> DistanceField:
     return field_of(problem, spacing=scenario.planner.spacing)
 
 
-def check(scenario: Scenario, certificate: Certificate, *, leg: int | None = None) -> Problem:
+def check(
+    scenario: Scenario, certificate: Certificate | str | Path, *, leg: int | None = None
+) -> Problem:
     """Prove a certificate again, as ``terrapath check`` does; returns the certificate's problem.
 
-    leg : the number of the tour's leg that is proven, from 1. Raises CertificateError where the
-    certificate does not hold, and InputError where the leg or the goal is not clear.
+    certificate : or its file. leg : the number of the tour's leg that is proven, from 1.
+    Raises CertificateError where the certificate does not hold, and InputError where the leg or
+    the goal is not clear.
     """
+    from ..certificates.certificate import Certificate
+
+    if isinstance(certificate, str | Path):
+        certificate = Certificate.load(certificate)
     with open_question(scenario) as question:
         problem = _leg(question.itinerary(), leg)
     certificate.check(problem)

@@ -13,6 +13,7 @@ import numpy as np
 
 from .._support.files import is_there
 from ..errors import InputError
+from ..validation import require_not_negative
 from .option import Point, Rectangle
 from .scenario import Scenario
 from .sections import LayerTable, MapSection
@@ -56,6 +57,7 @@ def open_question(scenario: Scenario) -> Iterator[Question]:
 
     name = place.path or ""
     require_map(name)
+    require_not_negative(radius=scenario.constraints.radius)
     with open_map(
         name,
         height_band=1 if place.height_band is None else place.height_band,
