@@ -27,7 +27,7 @@ def check_command(
         typer.Option(metavar="K", help="The leg of a tour that the certificate proves, from 1."),
     ] = None,
 ) -> int:
-    """Prove a lower bound again, from nothing but the problem and its certificate.
+    """Check a certificate: prove its lower bound again, from the problem alone.
 
     Give the same options for the problem as to `terrapath plan`. Exit codes: 0 the certificate
     holds, 2 it does not, or it belongs to another problem, 5 standard output is closed or full.
