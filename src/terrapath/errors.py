@@ -7,6 +7,7 @@ ordinary Python warning.
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import sys
@@ -16,6 +17,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TypeAlias
+
+import lazy_loader
 
 
 class TerrapathError(Exception):
@@ -137,8 +140,15 @@ def silence(category: type[Warning], module: str) -> None:
 
 
 def _level_outside() -> int:
-    """The ``stacklevel`` for ``tell``: that of the first caller outside Terrapath."""
+    """The ``stacklevel`` for ``tell``: that of the first caller outside Terrapath.
+
+    A module that is imported at its first use is imported by frames of Python and lazy_loader.
+    """
+    importers = (str(Path(module.__file__).parent) for module in (importlib, lazy_loader))
+    inside = (PACKAGE, "<frozen importlib", *importers)
     level, frame = 1, sys._getframe(1)
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
-        level, frame = level + 1, frame.f_back
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(inside):
+        if not frame.f_code.co_filename.startswith("<frozen importlib"):
+            level += 1  # warnings do not count the frames of imports
+        frame = frame.f_back
     return level

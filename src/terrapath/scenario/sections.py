@@ -97,7 +97,8 @@ class MapSection:
     layers: Annotated[
         LayerTables,
         Option(
-            "A further layer: a change of its value costs, as a change of height does; may be repeated.",
+            "A further layer: a change of its value costs, as a change of height does; may be "
+            "repeated.",
             A_LAYER,
             form="NAME=FILE[:BAND][*WEIGHT]",
             flags=("--layer",),
@@ -287,7 +288,8 @@ class PlannerSection:
     radius_factor: Annotated[
         float | None,
         a_number(
-            "The radius in which a new vertex looks for neighbours, as a multiple of the least that theory allows [default: 1.5].",
+            "The radius in which a new vertex looks for neighbours, as a multiple of the least "
+            "that theory allows [default: 1.5].",
             "F",
             "1.5",
         ),
