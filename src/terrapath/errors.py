@@ -144,7 +144,7 @@ def _level_outside() -> int:
 
     A module that is imported at its first use is imported by frames of Python and lazy_loader.
     """
-    importers = (str(Path(module.__file__).parent) for module in (importlib, lazy_loader))
+    importers = (str(Path(m.__file__ or PACKAGE).parent) for m in (importlib, lazy_loader))
     inside = (PACKAGE, "<frozen importlib", *importers)
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(inside):
