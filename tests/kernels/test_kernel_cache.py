@@ -403,3 +403,14 @@ def test_a_plan_on_a_full_disk(tmp_path):
     assert f"kernels cannot be kept in {disk}" in line
     assert "No space left on device" in line
     assert "NUMBA_CACHE_DIR" in line
+
+
+def test_what_editors_leave_beside_kernels_is_no_kernel(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "one.py").write_text("x = 1\n")
+    before = cache.package_stamp(tmp_path)
+    (tmp_path / "sub" / ".#one.py").symlink_to("nowhere")
+    (tmp_path / "folder.py").mkdir()
+    assert cache.package_stamp(tmp_path) == before
+    (tmp_path / "sub" / "two.py").write_text("")
+    assert cache.package_stamp(tmp_path) != before

@@ -25,3 +25,14 @@ def test_what_nothing_limits_has_all_of_its_bounds_and_says_so():
     assert not problem.free_space.has_obstacles
     assert problem.constraints.free_space().data._fields == problem.free_space.data._fields
     assert problem.constraints.radius == 2.0
+
+
+@pytest.mark.parametrize("steepest", [30, 30.0, np.float64(30.0), np.int64(30)])
+def test_a_slope_limit_may_be_any_number(steepest):
+    assert tp.Problem(FLAT, (0, 0), (10, 10), REGION, max_slope=steepest).constraints.steep is None
+
+
+@pytest.mark.parametrize("area", [(), []])
+def test_no_area_to_keep_in_is_no_free_place(area):
+    with pytest.raises(tp.InputError, match="keep_in is empty"):
+        tp.Problem(FLAT, (0, 0), (10, 10), REGION, keep_in=area)

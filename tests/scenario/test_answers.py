@@ -180,6 +180,22 @@ def test_the_help_names_the_defaults_of_the_planners():
     assert f"{corridor.HALF_WIDTH:g} coarse cells" in wide
 
 
+def test_points_and_paths_may_come_in_any_form():
+    points = ([9.0, 9.0], [2.0, 2.0])
+    for goals in (points, np.array(points), (tuple(p) for p in points), map(tuple, points)):
+        assert tp.scenario.load("one-peak", goal=goals).route.goals == ((9.0, 9.0), (2.0, 2.0))
+    assert tp.scenario.load("one-peak", goal=zip([9.0], [9.0], strict=True)).route.goals == (
+        (9.0, 9.0),
+    )
+
+
+@pytest.mark.parametrize("call", [tp.scenario.answer, tp.scenario.field])
+def test_what_is_no_scenario_is_refused_with_what_makes_one(call):
+    with pytest.raises(tp.InputError, match=r"make one with tp\.scenario\.load") as caught:
+        call("six-peaks")
+    one_line(caught)
+
+
 # Outputs
 
 
@@ -195,6 +211,9 @@ def test_files_are_written_when_asked(dem, tmp_path):
     ("options", "words"),
     [
         ({"output": "route.xyz"}, "no known format"),
+        ({"output": ""}, "no known format"),
+        ({"plot": ""}, "no known picture format"),
+        ({"certificate": ""}, "no known format"),
         ({"output": "missing/route.csv"}, "cannot be written"),
         ({"plot": "dem.tif"}, "dem.tif"),
         ({"certificate": "proof.npz", "bound": False}, "--certificate needs a lower bound"),

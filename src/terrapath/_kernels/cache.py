@@ -46,7 +46,8 @@ def package_stamp(folder: Path = _KERNELS) -> str:
     A kernel calls others in any module, so an edit in one of them makes all kernels stale.
     """
     digest = hashlib.sha256()
-    for source in sorted(folder.rglob("*.py")):
+    # Editors leave links that lead nowhere, as .#name.py, beside the files that they change.
+    for source in sorted(path for path in folder.rglob("*.py") if path.is_file()):
         digest.update(f"{source.relative_to(folder).as_posix()}\n".encode())
         digest.update(hashlib.sha256(source.read_bytes()).digest())
     return digest.hexdigest()

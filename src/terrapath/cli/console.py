@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import enum
 import math
 import os
@@ -71,7 +72,10 @@ def without_broken_messages() -> Iterator[None]:
             uncaught(kind, error, trace)
 
     def of_unraisable(what: sys.UnraisableHookArgs) -> None:
-        if "rasterio" not in str(what.object):
+        if issubclass(what.exc_type, KeyboardInterrupt):
+            # Ctrl-C while a callback of a library ran, which cannot raise it: raise it again.
+            _thread.interrupt_main()
+        elif "rasterio" not in str(what.object):
             unraisable(what)
 
     sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable

@@ -153,7 +153,7 @@ MOST_CELLS = 150_000_000  # of a map; 1.2 GB for each layer
 STEEPEST_DEGREES = 10.0  # if the rms slope is above this, small coordinates must be degrees
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class OpenMap:
     """A map whose files are open; see ``open_map``. Only for use in one thread."""
 
@@ -164,9 +164,15 @@ class OpenMap:
     smoothing: float | str | None
     crs: CRS | None
     files: ExitStack
+    is_closed: bool = False
+
+    def _require_open(self) -> None:
+        if self.is_closed:
+            raise InputError(f"{self.heights.band.label} is closed; use the map inside open_map")
 
     def cells(self, within: Rectangle | None = None) -> int:
         """How many cells ``surface`` would read of the heights, from the header alone."""
+        self._require_open()
         grid = self._view(within).grid
         return grid.rows * grid.columns
 
@@ -179,6 +185,7 @@ class OpenMap:
         most_cells: int = MOST_CELLS,
     ) -> Surface:
         """The surface of the map or of a part of it, as ``read_surface`` describes it."""
+        self._require_open()
         require_not_negative(margin=margin)
         require_count(decimate=decimate)
         require_count(most=2**62, most_cells=most_cells)
@@ -270,12 +277,16 @@ def open_map(
     require_not_negative(fill_holes=fill_holes)
     given = parse_crs(crs, f"crs={crs!r}")
     files = ExitStack()
+    opened = None
     try:
         with gdal():
             band = LayerSource.of_heights(source, height_band).open(files, given, heights=True)
         heights = Part("height", "rise", 1.0, band)
-        yield OpenMap(heights, layers or {}, costs or {}, fill_holes, smoothing, given, files)
+        opened = OpenMap(heights, layers or {}, costs or {}, fill_holes, smoothing, given, files)
+        yield opened
     finally:
+        if opened is not None:
+            opened.is_closed = True
         with gdal():
             files.close()
 

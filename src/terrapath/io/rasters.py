@@ -114,10 +114,10 @@ def open_band(
     number : the band, 1-based, or the name of a variable. crs : the CRS of a file that has none.
     """
     with reading(path):
-        dataset = files.enter_context(_open(path))
+        dataset = files.enter_context(open_dataset(path))
         if dataset.count == 0 or isinstance(number, str):
             name, number = (number, 1) if isinstance(number, str) else (None, number)
-            dataset = files.enter_context(_open(_variable(path, dataset, name)))
+            dataset = files.enter_context(open_dataset(_variable(path, dataset, name)))
         _require_band(path, dataset, number)
         _require_heights(path, dataset, number, heights)
         kind = np.dtype(dataset.dtypes[number - 1])
@@ -159,7 +159,7 @@ def open_classic_netcdf(path: Path, files: Any) -> Any:
         )
 
 
-def _open(path: str | Path) -> Any:
+def open_dataset(path: str | Path) -> Any:
     """Open a dataset, with credentials where its name needs them, as in s3:."""
     from rasterio.env import ensure_env_with_credentials
     from rasterio.errors import NotGeoreferencedWarning

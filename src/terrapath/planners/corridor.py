@@ -28,6 +28,8 @@ COARSE_CELLS = 1_000_000
 MOST_FINE_CELLS = 120_000_000
 # Half the corridor's width, in coarse cells.
 HALF_WIDTH = 40.0
+# And at least so many.
+LEAST_WIDTH = 0.1
 # The margin that is read around the corridor, in coarse cells, so that the surface reaches beyond.
 MARGIN = 2.0
 
@@ -122,7 +124,8 @@ def plan_in_corridor(
     if rough.path is None:
         return _without_corridor(rough, decimate)
     cell = _cell(rough.problem)
-    corridor = Corridor(rough, HALF_WIDTH * cell if half_width is None else half_width, decimate)
+    width = HALF_WIDTH * cell if half_width is None else _require_width(half_width, rough.problem)
+    corridor = Corridor(rough, width, decimate)
     window = corridor.within(MARGIN * cell)
     seen = min(_share(window, rough.problem.surface), 1.0) * cells
     problem, via = pose(Part(window, factor(seen, MOST_FINE_CELLS), corridor))
@@ -133,6 +136,18 @@ def plan_in_corridor(
         reason = f"{solution.stopped_by}; {hint}"
         solution = replace(solution, status=Status.NOT_FOUND, stopped_by=reason)
     return replace(solution, corridor=corridor, seconds=solution.seconds + rough.seconds)
+
+
+def _require_width(half_width: float, coarse: Problem) -> float:
+    """The half width that was asked for, no wider than the map; InputError where it is no width."""
+    cell, unit = _cell(coarse), coarse.surface.unit
+    if not half_width >= LEAST_WIDTH * cell:
+        raise InputError(
+            f"corridor={half_width:g} is too narrow for a map whose coarse cells are "
+            f"{cell:g} {unit}".rstrip()
+            + f"; give at least {LEAST_WIDTH * cell:.3g}"
+        )
+    return min(half_width, coarse.bounds.width + coarse.bounds.height)
 
 
 def factor(cells: float, most: int) -> int:

@@ -147,12 +147,15 @@ def _rehearse(work: Callable[[Surface], None], surface: Callable[[], Surface]) -
 def _listed(directory: Path) -> list[str] | None:
     """The listed files, if they are of the present kernels, and all of them exist undamaged."""
     try:
-        record = json.loads((directory / LIST_FILE).read_text(encoding="utf-8"))
+        file = directory / LIST_FILE
+        if not file.is_file():  # a pipe would be waited for
+            return None
+        record = json.loads(file.read_text(encoding="utf-8"))
         names: list[str] = record["files"]
         if record["key"] != cache.environment():
             return None
         sound = all(cache.read_sound(directory / name) is not None for name in names)
-        return names if sound else None
+        return names if names and sound else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 

@@ -13,7 +13,7 @@ from ..errors import InputError, TerrapathWarning, collecting
 from ..planners.base import PROVING, Callback, Progress
 from .option import Point
 from .question import Itinerary, Question, open_question
-from .scenario import Scenario
+from .scenario import Scenario, require_scenario
 
 if TYPE_CHECKING:
     from .._kernels.second_core import SecondCore
@@ -88,6 +88,7 @@ def answer(scenario: Scenario, *, watch: Callback | None = None) -> Answer:
     watch : gets the progress of each stage, and stops the planner by returning True.
     Raises TerrapathError, which names the value and the remedy.
     """
+    require_scenario(scenario)
     _require_agreement(scenario)
     planner = _planner(scenario)
     outputs = _outputs(scenario)
@@ -184,7 +185,7 @@ def _planner(scenario: Scenario) -> Finished:
 
 def _outputs(scenario: Scenario) -> RouteOutputs | None:
     """The files to write; None where the scenario names none."""
-    if not any(scenario.outputs()):
+    if not scenario.output.names_files:
         return None
     from .outputs import RouteOutputs
 

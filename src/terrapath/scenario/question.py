@@ -49,6 +49,7 @@ class Itinerary:
 @contextmanager
 def open_question(scenario: Scenario) -> Iterator[Question]:
     """A scenario's question. Its map is open as long as the context lasts."""
+    require_scenario(scenario)
     place = scenario.map
     if place.scene is not None:
         yield Question(scenario, None)

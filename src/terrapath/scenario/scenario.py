@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
 
+from ..errors import InputError
 from .option import STRICT, Declared, declared
 from .sections import ConstraintsSection, MapSection, OutputSection, PlannerSection, RouteSection
 
@@ -74,3 +75,9 @@ class Scenario:
             }
             changed[name] = dataclasses.replace(section, **merged)
         return dataclasses.replace(self, **changed)
+
+
+def require_scenario(value: object) -> None:
+    """Raise InputError for what is no scenario."""
+    if not isinstance(value, Scenario):
+        raise InputError(f"scenario={value!r:.60} is none; make one with tp.scenario.load")

@@ -379,3 +379,9 @@ class OutputSection:
         bool, a_switch("Print one JSON object and nothing else.", "--json/--no-json")
     ] = False
     quiet: Annotated[bool, a_switch("No progress bar.", "--quiet/--no-quiet", "-q")] = False
+
+    @property
+    def names_files(self) -> bool:
+        """Is any file named to be written? One without a name is named, too, and refused."""
+        others = (self.plot, self.profile, self.page, self.certificate)
+        return bool(self.files) or any(file is not None for file in others)

@@ -88,13 +88,12 @@ def _of_map(where: str, file: Path, crs: str | None) -> str:
 
 
 def _bands(where: str) -> list[Band]:
-    import rasterio
     from rasterio.errors import RasterioError
 
-    from ..io.rasters import gdal
+    from ..io.rasters import gdal, open_dataset
 
     try:
-        with gdal(), rasterio.open(where) as dataset:
+        with gdal(), open_dataset(where) as dataset:
             described = zip(dataset.descriptions, dataset.units, strict=True)
             return [Band(k, d or "", u or "") for k, (d, u) in enumerate(described, start=1)]
     except (RasterioError, OSError):

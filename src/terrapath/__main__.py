@@ -1,0 +1,5 @@
+"""``python -m terrapath`` is the command."""
+
+from .cli import main
+
+main()
