@@ -15,7 +15,7 @@ from .._support.files import is_there
 from ..errors import InputError
 from ..validation import require_not_negative
 from .option import Point, Rectangle
-from .scenario import Scenario
+from .scenario import Scenario, require_scenario
 from .sections import LayerTable, MapSection
 
 if TYPE_CHECKING:
