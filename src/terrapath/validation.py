@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TypeGuard
 
 import numpy as np
@@ -117,3 +118,11 @@ def require_choice(choices: tuple[str, ...], **values: object) -> None:
     for name, value in values.items():
         if value not in choices:
             raise InputError(f"{name}={value!r} is not known; choose one of {', '.join(choices)}")
+
+
+def is_there(path: Path) -> bool:
+    """Is there a file or a folder? False also for a name that none can have."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False

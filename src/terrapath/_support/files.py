@@ -19,14 +19,6 @@ BAG_ENDING, BAG_MARK = ".bag2", "metadata.yaml"
 TEMPORARY = ".terrapath-"
 
 
-def is_there(path: Path) -> bool:
-    """Is there a file or a folder? False also for a name that none can have."""
-    try:
-        return path.exists()
-    except (OSError, ValueError):
-        return False
-
-
 def _require_bag(path: Path) -> None:
     """Raise OSError where writing a bag would replace anything but a bag or an empty folder."""
     if not path.exists() and not path.is_symlink():

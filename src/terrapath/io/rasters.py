@@ -14,11 +14,10 @@ from pyproj import CRS
 from rasterio import Affine
 
 from .._support.extras import require_packages
-from .._support.files import is_there
 from ..errors import MapError, TerrapathError, silence
 from ..surface.georeference import parse_crs
 from ..surface.raster import Grid
-from ..validation import Array
+from ..validation import Array, is_there
 from .bands import Band
 
 MOST_BLOCK_BYTES = 2 * 2**30

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .._support.files import is_there
 from ..errors import InputError
-from ..validation import require_not_negative
+from ..validation import is_there, require_not_negative
 from .option import Point, Rectangle
 from .scenario import Scenario, require_scenario
 from .sections import LayerTable, MapSection

@@ -12,8 +12,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from .._support.files import is_there
 from ..errors import InputError
+from ..validation import is_there
 from .checked import WrongValueError, validated
 from .scenario import Scenario, options
 

@@ -15,9 +15,9 @@ from pyproj.exceptions import CRSError
 from shapely.geometry.base import BaseGeometry
 
 from ..._support.extras import require_packages
-from ..._support.files import is_there
 from ...errors import MapError, RepairedWarning, VectorWarning, silence, tell
 from ...space.free_space import Geometries, Indices, simple_parts
+from ...validation import is_there
 
 FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30
