@@ -221,7 +221,7 @@ def test_the_files_of_an_open_map_are_closed_with_it(maps):
 
     with pytest.raises(ValueError, match="mine"), open_map(maps["plain"]["source"]) as opened:
         raise ValueError("mine")
-    with pytest.raises(tp.MapError, match=r"plain\.tif cannot be read"):
+    with pytest.raises(tp.InputError, match=r"plain\.tif is closed; use the map inside open_map"):
         opened.surface()
 
 
