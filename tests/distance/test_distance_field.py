@@ -407,3 +407,18 @@ def test_the_same_field_twice():
         for _ in range(2)
     )
     assert (a.values == b.values).all()
+
+
+# Rough ground
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_on_steep_noise_distances_are_above_zero(seed):
+    # The source's model does not hold here, and once made nearly all of them negative.
+    random = np.random.default_rng([7, seed])
+    axis = 10.0 * np.arange(40)
+    surface = tp.Surface.from_grid(300.0 * random.standard_normal((40, 40)), axis, axis)
+    field = tp.distance_field(surface, (200.0, 200.0), spacing=5.0)
+    at_source = field.values == 0.0
+    assert at_source.sum() == 1
+    assert (field.values[~at_source] > 0.0).all()

@@ -78,6 +78,14 @@ def nearest(u, links, n, step, side):
 
 
 @inner_kernel
+def least_upwind(u, links, n, steps):
+    """The smallest settled value along the three directions."""
+    a0 = nearest(u, links, n, steps.s0, 0)
+    a1 = nearest(u, links, n, steps.s1, 2)
+    return min(a0, a1, nearest(u, links, n, steps.s2, 4))
+
+
+@inner_kernel
 def first_order(u, node, nx, n):
     """The value of a node by first-order differences to settled neighbours."""
     s = steps_of(node, nx)
@@ -215,10 +223,13 @@ def solve_factored(u, trial, node, source, nx, n):
 def second_order(u, trial, node, source, nx, n):
     """The second-order value of a node whose first-order value is ``trial``."""
     links = node.links
-    if links & WINDOW:
-        return solve_factored(u, trial, node, source, nx, n)
-    r0, r1, r2 = np.float64(node.rho0), np.float64(node.rho1), np.float64(node.rho2)
     s = steps_of(node, nx)
+    if links & WINDOW:
+        value = solve_factored(u, trial, node, source, nx, n)
+        # The values of plain differences rise from node to node; of the model's, where it holds.
+        if value > least_upwind(u, links, n, s):
+            return value
+    r0, r1, r2 = np.float64(node.rho0), np.float64(node.rho1), np.float64(node.rho2)
     if links == ALL_LINKS:
         d0 = plain_difference(u, trial, n, s.s0, r0)
         d1 = plain_difference(u, trial, n, s.s1, r1)
