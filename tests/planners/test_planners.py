@@ -278,6 +278,16 @@ def test_an_error_in_a_callback_reaches_the_caller(problem):
         tp.RRTStar(samples=1000).solve(problem, callback=fail)
 
 
+@pytest.mark.parametrize("stage", ["searching", "refining the path", "proving the bound"])
+def test_an_error_in_a_callback_of_any_stage_reaches_the_caller(stage, problem):
+    def fail(progress):
+        if progress.stage == stage:
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        tp.plan(problem, samples=1000, refine=True, bound=True, callback=fail)
+
+
 def assert_interrupted(solution, problem):
     assert solution.status is tp.Status.INTERRUPTED
     assert solution.stopped_by == "interrupt"

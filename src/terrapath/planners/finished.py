@@ -113,13 +113,15 @@ def refined(solution: Solution, *, callback: Callback | None = None) -> Solution
     problem, given = solution.problem, solution.path
     if given is None or solution.unrefined is not None or problem.start == problem.goal:
         return solution
-    started = time.perf_counter()
+    started, watcher = time.perf_counter(), _Watcher(callback)
     try:
-        _announce(solution, REFINING, callback)
+        _announce(solution, REFINING, watcher)
         path = refine(problem, given)
     except KeyboardInterrupt:
         return _interrupted(solution)
     except Exception as error:
+        if error is watcher.error:
+            raise
         tell_unfinished("the path could not be refined and is the planner's own", error)
         return solution
     seconds = solution.seconds + time.perf_counter() - started
@@ -142,7 +144,7 @@ def with_bound(
     _require_limits(target_gap, time_limit)
     if solution.path is None or _is_proven(solution, target_gap):
         return solution
-    started, before = time.perf_counter(), solution.seconds
+    started, before, watcher = time.perf_counter(), solution.seconds, _Watcher(callback)
     best: Certificate | None = None
 
     def watch(certificate: Certificate) -> bool:
@@ -150,10 +152,10 @@ def with_bound(
         best = certificate
         seen = _progress(solution, PROVING, before + time.perf_counter() - started)
         seen = seen._replace(lower_bound=float(certificate))
-        return callback is not None and bool(callback(seen))
+        return watcher(seen)
 
     try:
-        _announce(solution, PROVING, callback)
+        _announce(solution, PROVING, watcher)
         best = lower_bound(
             solution.problem,
             length=solution.path.length,
@@ -164,6 +166,8 @@ def with_bound(
     except KeyboardInterrupt:
         solution = _interrupted(solution)
     except Exception as error:
+        if error is watcher.error:
+            raise
         tell_unfinished("no better bound could be proven", error)
     solution = replace(solution, seconds=before + time.perf_counter() - started)
     return solution if best is None else with_certificate(solution, best)
@@ -197,7 +201,21 @@ def _progress(solution: Solution, stage: str, seconds: float) -> Progress:
     return Progress(count, count, seconds, length, solution.lower_bound or 0.0, stage)
 
 
-def _announce(solution: Solution, stage: str, callback: Callback | None) -> None:
+class _Watcher:
+    """A callback, and the error that it raised: the caller's own, and no failure of a stage."""
+
+    def __init__(self, callback: Callback | None) -> None:
+        self.callback = callback
+        self.error: Exception | None = None
+
+    def __call__(self, progress: Progress) -> bool:
+        try:
+            return self.callback is not None and bool(self.callback(progress))
+        except Exception as error:
+            self.error = error
+            raise
+
+
+def _announce(solution: Solution, stage: str, watcher: _Watcher) -> None:
     """Show the callback which stage begins; here it can stop nothing."""
-    if callback is not None:
-        callback(_progress(solution, stage, solution.seconds))
+    watcher(_progress(solution, stage, solution.seconds))
