@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Protocol
 
-from ..problem import Problem, Solution, Status
+from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..validation import require_positive
 
@@ -131,6 +131,13 @@ def solve_within(
     if time_limit is None:
         return planner.solve(problem, callback=callback)
     return planner.solve(problem, callback=callback, time_limit=time_limit)
+
+
+def status_of(path: Path | None, stopped_by: str) -> Status:
+    """The status of a search that found this path, or none, when this ended it."""
+    if stopped_by == INTERRUPT:
+        return Status.INTERRUPTED
+    return Status.NOT_FOUND if path is None else Status.SOLVED
 
 
 def stay_put(problem: Problem, planner: str, seed: int | None = None) -> Solution:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ..distance.field import DistanceField, Medium, march_from
-from ..problem import Path, Problem, Solution, Status
+from ..problem import Path, Problem, Solution
 from ..space.lattice import Lattice
 from ..validation import require_positive
 from .base import (
@@ -17,6 +17,7 @@ from .base import (
     answer_without_search,
     lattices,
     least_limit,
+    status_of,
 )
 
 
@@ -99,11 +100,10 @@ class _Run:
         return self.stopper.must_stop(progress)
 
     def answer(self, path: Path | None, cost: float | None, stopped_by: str) -> Solution:
-        status = Status.NOT_FOUND if path is None else Status.SOLVED
         return Solution(
             problem=self.problem,
             planner=self.planner.name,
-            status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
+            status=status_of(path, stopped_by),
             path=path,
             cost=cost,
             seconds=self.stopper.seconds,

@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from .._kernels.planners import grid_search as kernels, tree as trees
 from ..errors import InputError
-from ..problem import Path, Problem, Solution, Status
+from ..problem import Path, Problem, Solution
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, require_count, require_positive
-from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit
+from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit, status_of
 from .rrt_star import FEATURES_PER_PANEL
 
 # Vertices settled between two looks at the clock, the callback and Ctrl-C.
@@ -301,11 +301,10 @@ def _search_grid(
     stopped_by = _run(search, callback)
     seconds = search.seconds
     path = _path(search)
-    status = Status.NOT_FOUND if path is None else Status.SOLVED
     return Solution(
         problem=problem,
         planner=planner.name,
-        status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
+        status=status_of(path, stopped_by),
         path=path,
         cost=None if path is None else search.best_cost,
         seconds=seconds,

@@ -18,6 +18,7 @@ from .base import (
     answer_without_search,
     lattices,
     least_limit,
+    status_of,
 )
 from .finished import with_bound
 
@@ -153,11 +154,10 @@ class _Run:
     def answer(self) -> Solution:
         """What was found, without a lower bound."""
         path = self.routes[0] if self.routes else None
-        status = Status.NOT_FOUND if path is None else Status.SOLVED
         return Solution(
             problem=self.problem,
             planner=self.planner.name,
-            status=Status.INTERRUPTED if self.stopper.stopped_by == INTERRUPT else status,
+            status=status_of(path, self.stopper.stopped_by),
             path=path,
             cost=None if path is None else path.length,
             seconds=self.stopper.seconds,

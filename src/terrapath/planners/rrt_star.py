@@ -12,7 +12,7 @@ import numpy as np
 
 from .._kernels.planners import rrt_star as kernels, tree as trees
 from .._kernels.planners.buckets import Buckets
-from ..problem import History, Path, Problem, SearchTree, Solution, Status
+from ..problem import History, Path, Problem, SearchTree, Solution
 from ..surface import Surface
 from ..validation import (
     Array,
@@ -23,7 +23,7 @@ from ..validation import (
     require_positive,
     require_seed,
 )
-from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit
+from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit, status_of
 
 # Samples between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 512
@@ -254,11 +254,10 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     stopped_by = _run(search, callback)
     seconds = search.seconds
     path = _path(problem, tree)
-    status = Status.NOT_FOUND if path is None else Status.SOLVED
     return Solution(
         problem=problem,
         planner=options.planner,
-        status=Status.INTERRUPTED if stopped_by == INTERRUPT else status,
+        status=status_of(path, stopped_by),
         path=path,
         cost=None if path is None else search.best_cost,
         seconds=seconds,
