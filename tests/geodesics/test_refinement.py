@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 import planner_oracles
 import terrapath as tp
 from common import FLAT, REGION, mostly_slow
+from layouts import LAYOUTS
 from oracles import (
     boxes_of_mask,
     geodesic_by_collocation,
@@ -251,18 +252,8 @@ def test_on_real_terrain_the_path_becomes_a_local_minimum(weight):
 
 # Flat ground: taut strings
 
-LAYOUTS = {
-    "box": [shapely.box(3.0, 2.0, 8.0, 7.0)],
-    "corridor": [shapely.box(3.0, -2.0, 7.0, 6.8), shapely.box(3.0, 7.0, 7.0, 12.0)],
-    "chicane": [shapely.box(2.0, -2.0, 3.0, 8.0), shapely.box(6.0, 1.0, 7.0, 12.0)],
-    "horseshoe": [
-        shapely.Polygon([(2, 2), (9, 2), (9, 9), (2, 9), (2, 8), (8, 8), (8, 3), (2, 3)])
-    ],
-    "courtyard": [
-        shapely.box(6.0, 6.0, 10.9, 10.9)
-        - shapely.box(7.0, 7.0, 10.4, 10.4)
-        - shapely.box(9.0, 5.0, 9.8, 7.5)
-    ],
+SHARED = ("box", "corridor", "chicane", "horseshoe", "courtyard")
+AROUND = {name: LAYOUTS[name] for name in SHARED} | {
     "spikes": [
         shapely.Polygon([(1, 4), (5, 1), (4.5, 5)]),
         shapely.Polygon([(5.5, 5), (9, 4), (5.8, 9.6)]),
@@ -287,9 +278,9 @@ def assert_taut(problem, points):
             assert not is_free(problem, np.array([b - reach * before, b + reach * after]))
 
 
-@pytest.mark.parametrize("name", LAYOUTS)
+@pytest.mark.parametrize("name", AROUND)
 def test_around_polygons_the_path_is_the_taut_string(name):
-    polygons = LAYOUTS[name]
+    polygons = AROUND[name]
     problem = tp.Problem(FLAT, START, GOAL, REGION, polygons)
     shortest = planner_oracles.visibility_length(START, GOAL, polygons, REGION)
     excesses = []
