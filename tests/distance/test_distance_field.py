@@ -345,6 +345,29 @@ def test_no_wall_is_too_thin_and_gaps_are_found():
     assert solution.length <= 1.02 * 2.0 * math.hypot(4.0, 4.8)
 
 
+def boxes_far_from_the_origin(seed):
+    """The origin, boxes with corners at multiples of a half, and a start and a goal."""
+    random = np.random.default_rng([13, seed])
+    origin, boxes = np.array([5e5, 4.2e6]), []
+    for _ in range(14):
+        corner = origin + random.integers(0, 30, 2) / 2.0
+        boxes.append(shapely.box(*corner, *(corner + random.integers(1, 8, 2) / 2.0)))
+    return origin, shapely.union_all(boxes), origin + random.integers(0, 33, (2, 2)) / 2.0
+
+
+# In 1355 the end of a step, rounded, once lay in a corner.
+@pytest.mark.parametrize("seed", [1355, 2, 4, 5, 9])
+def test_no_path_touches_a_box_far_from_the_origin(seed):
+    origin, ground, (start, goal) = boxes_far_from_the_origin(seed)
+    axis = np.arange(-1.0, 18.0)
+    surface = tp.Surface.from_grid(np.zeros((19, 19)), *(at + axis for at in origin))
+    bounds = (*(origin - 0.5), *(origin + 17.0))
+    field = tp.distance_field(surface, start, bounds=bounds, obstacles=[ground], spacing=17.5 / 97)
+    path = field.path_to(goal)
+    assert path is not None
+    assert path.line.disjoint(ground)
+
+
 def test_a_gap_finer_than_the_nodes_is_found_on_finer_ones():
     wall = shapely.box(5, -1, 5.2, 4).union(shapely.box(5, 4.03, 5.2, 11))
     problem = tp.Problem(FLAT, (2.0, 2.0), (8.0, 2.0), REGION, [wall])

@@ -360,9 +360,11 @@ def descend(surface, space, field, x, y, level, step):
         return ROUGH_PLACE
     share = min(step / nodes_apart(grid, x, y, best.x, best.y), 1.0)
     value = best.end + share * (best.begin - best.end)
-    if not value < level:
-        share, value = 1.0, best.begin
-    return Slope(value, x + share * (best.x - x), y + share * (best.y - y))
+    nx, ny = x + share * (best.x - x), y + share * (best.y - y)
+    # Rounding puts the end of a share beside the segment that was tested.
+    if value < level and (not field.has_obstacles or segment_is_free(space, x, y, nx, ny)):
+        return Slope(value, nx, ny)
+    return Slope(best.begin, best.x, best.y)
 
 
 # A path that is this near to the source, in nodes, ends with a straight step.
