@@ -1,4 +1,4 @@
-"""The distance field: the eikonal equation of h on a lattice, by fast marching."""
+"""The distance field: how far every node of a lattice is from a source, by fast marching."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.distance import calendar_queue, dependents, descent, eikonal as kernels, stencils
-from .._kernels.surface.metric_rows import ROWS, columns_of
+from .._kernels.distance import calendar_queue, descent, ground, hopf_lax, star
+from .._kernels.surface.metric_rows import columns_of, fill_samples
 from ..errors import InputError, OutsideSurfaceError
 from ..problem import Path, Problem
 from ..space.free_space import FreeSpace, Obstacle
@@ -34,110 +34,89 @@ CHUNK = 100_000
 # The length of a step on a path back to the source, in nodes.
 STEP = 0.5
 
-# The vectors of stencils are stored in 16 bits.
-LONGEST_SIDE = 2**15 - 1
-# On average a node has at most 6 + 8 dependents, and all these are numbered in 31 bits.
-MOST_NODES = (2**31 - 1) // 14
+# The edges of all nodes are numbered in 31 bits; on the steepest ground a node has 64.
+MOST_NODES = (2**31 - 1) // (2 * star.HALF)
 
-# The nodes of a lattice as kernels store them, (ny * nx,) of ``stencils.NODE``.
-Nodes = npt.NDArray[np.void]
+# Nodes within this distance of the source, in nodes, are seeds: a straight way leads there.
+SEED_RADIUS = 1.5
+
+# An edge between neighbouring nodes has at least three samples, and two for each feature of the
+# surface; but no more pieces than this.
+MOST_PIECES = 4
 
 # Is called with the number of nodes settled so far; returning True stops the march.
 Watch = Callable[[int], bool | None]
 
 
 class Medium:
-    """A metric on a lattice, prepared for fast marching from any source.
+    """A surface and its free space on a lattice, prepared for marching from any source."""
 
-    nodes : the stencil of each node. typical_cost : of the surface, a factor on lengths.
-    """
-
-    def __init__(self, lattice: Lattice, nodes: Nodes, typical_cost: float = 1.0) -> None:
-        self.lattice = lattice
-        self.nodes = nodes
-        self.typical_cost = typical_cost
-        self.dependents = self._dependents()
-
-    @classmethod
-    def of_surface(
-        cls, surface: Surface, lattice: Lattice, free_space: FreeSpace | None = None
-    ) -> Medium:
-        """The metric h of a surface; no link between nodes touches an obstacle."""
-        nodes = _surface_stencils(surface, lattice)
-        if free_space is not None and free_space.has_obstacles:
-            stencils.cut_links(free_space.data, lattice.data, nodes)
-        return cls(lattice, nodes, surface.typical_cost)
-
-    @classmethod
-    def around(cls, surface: Surface, lattice: Lattice, blocked: npt.NDArray[np.bool_]) -> Medium:
-        """The metric h of a surface; links may touch obstacles, but ``blocked`` nodes are left out.
-
-        blocked : (ny, nx).
-        """
-        nodes = _surface_stencils(surface, lattice)
-        if blocked.any():
-            stencils.block_nodes(lattice.data, blocked.ravel().astype(np.uint8), nodes)
-        return cls(lattice, nodes, surface.typical_cost)
-
-    def shrink(self, factors: Array) -> None:
-        """Multiply lengths at the nodes by factors (ny, nx). This changes the medium itself."""
-        scale = 1.0 / np.square(np.asarray(factors, np.float64).ravel())
-        for rho in ("rho0", "rho1", "rho2"):
-            self.nodes[rho] *= scale
-
-    @classmethod
-    def of_tensors(cls, tensors: npt.ArrayLike, lattice: Lattice) -> Medium:
-        """Any Riemannian metric.
-
-        tensors : (ny, nx, 3), h11, h12 and h22 at the nodes. Raises InputError where one is not
-        positive definite.
-        """
-        given = as_array(tensors, "tensors", shape=(lattice.ny, lattice.nx, 3))
-        if not (given[..., 0] * given[..., 2] > given[..., 1] ** 2).all():
-            raise InputError("tensors hold one that is not positive definite; check their order")
-        nodes = _allocate(lattice)
-        stencils.lay_tensor_stencils(given, lattice.data, nodes)
-        return cls(lattice, nodes)
-
-    def _dependents(self) -> dependents.Dependents:
-        nx, first = self.lattice.nx, np.zeros(len(self.nodes) + 1, np.int32)
-        # The number of a node's dependents is stored one place after the node, and then summed up.
-        dependents.note_dependents(self.nodes, nx, first[1:], np.empty(0, np.uint32))
-        np.cumsum(first, dtype=np.int32, out=first)
-        entries = np.empty(first[-1], np.uint32)
-        dependents.note_dependents(self.nodes, nx, first, entries)
-        first[1:] = first[:-1]  # each now points to its end, where the next begins
-        first[0] = 0
-        return dependents.Dependents(first, entries)
+    def __init__(self, surface: Surface, lattice: Lattice, free_space: FreeSpace) -> None:
+        self.surface, self.lattice, self.free_space = surface, lattice, free_space
+        self.ground = _sample(surface, lattice)
+        self.stars = _lay_stars(self.ground, lattice, free_space)
+        self.data = hopf_lax.Medium(
+            self.ground, self.stars, free_space.data, lattice.data, free_space.has_obstacles
+        )
 
     def march(
-        self, model: SourceModel, *, limit: float = math.inf, watch: Watch | None = None
-    ) -> Array:
-        """Distances (ny, nx) from the source, map units; infinite where not reached.
+        self, source: tuple[float, float], *, limit: float = math.inf, watch: Watch | None = None
+    ) -> tuple[Array, Array]:
+        """Distances from a source, map units, and these over the chord: both (ny, nx).
 
-        limit : nodes farther than this are not settled, map units. watch : is called now and then
-        with the number of nodes settled; returning True stops the march.
+        They are infinite where no edge leads. limit : nodes farther than this are not settled, map
+        units. watch : is called now and then with the number of nodes settled; returning True
+        stops the march.
         """
-        lattice = self.lattice
-        source = kernels.Source(*model[:5])
-        front = self._front(model)
-        rows = slice(model.row, model.row + model.values.shape[0])
-        columns = slice(model.column, model.column + model.values.shape[1])
-        window = self.nodes["links"].reshape(lattice.ny, lattice.nx)[rows, columns]
-        window[~np.isnan(model.values)] |= stencils.WINDOW
-        try:
-            kernels.plant(
-                self.nodes, front, self.dependents, lattice.nx, model.seeds, model.seed_values
-            )
-            self._settle(front, source, limit, watch)
-        finally:
-            window &= ~np.uint16(stencils.WINDOW)
-        return front.u.reshape(lattice.ny, lattice.nx)
+        lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
+        place = (np.asarray(source) - lattice.bounds[:2]) / (lattice.dx, lattice.dy)
+        lift = self.surface.lift(np.asarray(source))[2:]
+        begin = hopf_lax.Source(float(place[0]), float(place[1]), np.ascontiguousarray(lift))
+        state = hopf_lax.State(
+            tau=np.full(count, math.inf),
+            best=np.full(count, hopf_lax.UNSEEN, np.uint8),
+            queued=np.zeros(count, np.uint8),
+            links=np.zeros(count, calendar_queue.LINK),
+        )
+        seeds, values = self._seeds(source, place)
+        front = self._front(values)
+        state.tau[seeds] = float(self.surface.cost(np.asarray(source)))
+        hopf_lax.plant(front, state, seeds, values)
+        settled, chunk = 0, CHUNK
+        while chunk == CHUNK:
+            chunk = hopf_lax.march(self.data, front, state, begin, CHUNK, float(limit))
+            settled += chunk
+            if watch is not None and watch(settled):
+                break
+        shape = (lattice.ny, lattice.nx)
+        return front.u.reshape(shape), state.tau.reshape(shape)
 
-    def _front(self, model: SourceModel) -> calendar_queue.Front:
-        lattice, count = self.lattice, len(self.nodes)
+    def _seeds(
+        self, source: tuple[float, float], place: Array
+    ) -> tuple[npt.NDArray[np.int64], Array]:
+        """The nodes beside the source that a free segment leads to, and their distances."""
+        lattice = self.lattice
+        rows, columns = (
+            np.arange(max(math.ceil(at - SEED_RADIUS), 0), min(at + SEED_RADIUS + 1e-9, last) + 1)
+            for at, last in ((place[1], lattice.ny - 1), (place[0], lattice.nx - 1))
+        )
+        columns, rows = (a.ravel() for a in np.meshgrid(columns.astype(int), rows.astype(int)))
+        points = np.column_stack([lattice.x[columns], lattice.y[rows]])
+        near = np.hypot(columns - place[0], rows - place[1]) <= SEED_RADIUS
+        starts = np.broadcast_to(np.asarray(source), points.shape)
+        near &= self.free_space.segments_are_free(starts, points)
+        seeds = (rows * lattice.nx + columns)[near].astype(np.int64)
+        costs = np.empty(len(seeds))
+        pieces = 2 * self.ground.pieces
+        ground.fill_rays(
+            self.surface.data, np.asarray(source), np.ascontiguousarray(points[near]), pieces, costs
+        )
+        return seeds, costs
+
+    def _front(self, values: Array) -> calendar_queue.Front:
+        lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
         width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
-        width *= self.typical_cost
+        width *= self.surface.typical_cost
         front = calendar_queue.Front(
             u=np.full(count, np.inf),
             trial=np.full(count, np.inf),
@@ -145,44 +124,47 @@ class Medium:
             days_per_unit=1.0 / width,
             counters=np.zeros(2, np.int64),
         )
-        if len(model.seeds):
-            front.counters[calendar_queue.DAY] = int(model.seed_values.min() / width)
+        if len(values):
+            front.counters[calendar_queue.DAY] = int(values.min() / width)
         return front
 
-    def _settle(
-        self,
-        front: calendar_queue.Front,
-        source: kernels.Source,
-        limit: float,
-        watch: Watch | None,
-    ) -> None:
-        settled = 0
-        while True:
-            chunk = kernels.march(
-                self.nodes, front, self.dependents, source, self.lattice.nx, CHUNK, float(limit)
-            )
-            settled += chunk
-            stopped = watch is not None and watch(settled)
-            if stopped or chunk < CHUNK:
-                return
+
+def _sample(surface: Surface, lattice: Lattice) -> ground.Ground:
+    """Heights and costs between and at the nodes."""
+    features = max(lattice.dx, lattice.dy) / surface.resolution
+    import os
+    pieces = min(max(math.ceil(features - 1e-9), int(os.environ.get('PIECES','1'))), MOST_PIECES)
+    per = 2 * pieces
+    grid = lattice.data._replace(
+        dx=lattice.dx / per,
+        dy=lattice.dy / per,
+        nx=(lattice.nx - 1) * per + 1,
+        ny=(lattice.ny - 1) * per + 1,
+    )
+    heights = np.empty((len(surface.data.weights), grid.ny, grid.nx))
+    costs = np.empty((1 if surface.costs else 0, grid.ny, grid.nx))
+    fill_samples(surface.data, grid, columns_of(surface.data, grid), heights, costs)
+    return ground.Ground(heights, costs, grid.dx, grid.dy, pieces, surface.least_cost)
 
 
-def _surface_stencils(surface: Surface, lattice: Lattice) -> Nodes:
-    """Nodes with the stencils of the metric h."""
-    nodes, grid = _allocate(lattice), lattice.data
-    columns, row = columns_of(surface.data, grid), np.empty((ROWS, lattice.nx))
-    stencils.lay_surface_stencils(surface.data, grid, columns, row, nodes)
-    return nodes
-
-
-def _allocate(lattice: Lattice) -> Nodes:
-    sides, count = (lattice.nx, lattice.ny), lattice.nx * lattice.ny
-    if max(sides) > LONGEST_SIDE or count > MOST_NODES:
+def _lay_stars(samples: ground.Ground, lattice: Lattice, free_space: FreeSpace) -> star.Stars:
+    """The edges that a march needs, without those that touch an obstacle."""
+    count = lattice.nx * lattice.ny
+    if count > MOST_NODES:
         raise InputError(
-            f"the lattice has {lattice.nx:,} x {lattice.ny:,} nodes, more than {LONGEST_SIDE:,} "
-            f"on a side or {MOST_NODES:,} in all; give a wider spacing"
+            f"the lattice has {lattice.nx:,} x {lattice.ny:,} nodes, more than {MOST_NODES:,} in "
+            "all; give a wider spacing"
         )
-    return np.zeros(count, stencils.NODE)
+    ahead, back = np.zeros(count, np.uint32), np.zeros(count, np.uint32)
+    first = np.zeros(count + 1, np.int32)
+    star.choose_edges(samples, lattice.nx, lattice.ny, ahead, back)
+    if free_space.has_obstacles:
+        star.cut_edges(free_space.data, lattice.data, ahead, back)
+    star.count_edges(ahead, back, first)
+    edges = int(first[-1])
+    stars = star.Stars(first, np.empty(edges, np.uint8), np.empty(edges, np.float32))
+    star.lay_edges(samples, lattice.nx, ahead, back, stars)
+    return stars
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
+from ..dtypes import record
+
+# The lists of the buckets: the next node in the list, -1 where none; the node before it, at the
+# head -2 - bucket.
+LINK = record(("after", np.int32), ("before", np.int32))
 
 
 class Front(NamedTuple):

@@ -63,6 +63,17 @@ def fill_peaks_row(surface, grid, j, columns, row):
         add_layer(row, surface.weights[layer] * surface.weights[layer])
 
 
+@kernel
+def fill_peaks_heights(surface, grid, j, columns, layer, heights):
+    y = grid.y0 + j * grid.dy
+    heights[:] = 0.0
+    for p in range(surface.first[layer], surface.first[layer + 1]):
+        falloff, d = surface.peaks[p, 1], y - surface.peaks[p, 3]
+        share = surface.weights[layer] * math.exp(-falloff * d * d) / falloff
+        for i in range(grid.nx):
+            heights[i] += share * columns[2 * p, i]
+
+
 @allocating_kernel
 def spline_columns(surface, grid):
     """(11, nx or more): basis, slopes and cell of each column; then space for sums along x2."""
@@ -132,6 +143,38 @@ def fill_spline_row(surface, grid, j, columns, row):
         multiply_by_cost(columns, row)
 
 
+@kernel
+def fill_spline_heights(surface, grid, j, columns, layer, heights):
+    cell, weight = spline_cell(surface, surface.x0, grid.y0 + j * grid.dy), surface.weights[layer]
+    sum_columns(surface.coefficients[layer], cell.j, basis(cell.v), columns[9])
+    values = columns[9]
+    for i in range(grid.nx):
+        c, height = int(columns[8, i]), 0.0
+        for k in range(4):
+            height += columns[k, i] * values[c + k]
+        heights[i] = weight * height
+
+
+@kernel
+def fill_peaks_costs(surface, grid, j, columns, costs):
+    costs[:] = 1.0
+
+
+@kernel
+def fill_spline_costs(surface, grid, j, columns, costs):
+    costs[:] = 1.0
+    if surface.log_cost.shape[0] == 0:
+        return
+    cell = spline_cell(surface, surface.x0, grid.y0 + j * grid.dy)
+    sum_columns(surface.log_cost[0], cell.j, basis(cell.v), columns[9])
+    values = columns[9]
+    for i in range(grid.nx):
+        c, log_cost = int(columns[8, i]), 0.0
+        for k in range(4):
+            log_cost += columns[k, i] * values[c + k]
+        costs[i] = math.exp(log_cost)
+
+
 @per_class({Peaks: peaks_columns, Spline: spline_columns})
 def columns_of(surface, grid):
     """The values that depend on x1 alone, which all rows of a lattice share."""
@@ -140,3 +183,23 @@ def columns_of(surface, grid):
 @per_class({Peaks: fill_peaks_row, Spline: fill_spline_row})
 def fill_row(surface, grid, j, columns, row):
     """The metric at the nodes of row j: row (ROWS, nx)."""
+
+
+@per_class({Peaks: fill_peaks_heights, Spline: fill_spline_heights})
+def fill_height_row(surface, grid, j, columns, layer, heights):
+    """The weighted heights of a layer at the nodes of row j: heights (nx,)."""
+
+
+@per_class({Peaks: fill_peaks_costs, Spline: fill_spline_costs})
+def fill_cost_row(surface, grid, j, columns, costs):
+    """The costs at the nodes of row j: costs (nx,)."""
+
+
+@kernel
+def fill_samples(surface, grid, columns, heights, costs):
+    """Weighted heights (layers, ny, nx) and costs (0 or 1, ny, nx) at all nodes of a lattice."""
+    for j in range(grid.ny):
+        for layer in range(heights.shape[0]):
+            fill_height_row(surface, grid, j, columns, layer, heights[layer, j])
+        for layer in range(costs.shape[0]):
+            fill_cost_row(surface, grid, j, columns, costs[layer, j])

@@ -1,0 +1,327 @@
+"""What a short straight piece of a path costs, with what a path saves by bending a little.
+
+A piece v has a lift in R^n: its rise in every layer comes after its two planar parts. Two rules
+with one and two chords give Richardson's value (4 C_2 - C_1) / 3, which is never below C_1, the
+chord. The shortest path between both ends is not straight: where the lift sags by d below its
+chord, a shift along w, across the piece, takes away the share
+
+    <d, w>^2 / (|d|^2 |w|^2)
+
+of what the sag adds; d and w are taken without their parts along v. For one layer with grade m
+and the slope g across, (1 + m^2) / (1 + m^2 + g^2) of it is left.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler import inner_kernel, kernel
+from ..surface.surfaces import floor_of, log_cost_at, slope_at, spot_at, squared_cost_at
+from ..vec4 import sqrt
+
+
+class Ground(NamedTuple):
+    """Heights and costs at samples of a surface, 2 ``pieces`` times as dense as nodes."""
+
+    heights: np.ndarray  # (layers, rows, columns) float64: weighted, map units
+    costs: np.ndarray  # (0 or 1, rows, columns) float64
+    dx: float  # distance of samples, map units
+    dy: float
+    pieces: int  # an edge between neighbouring nodes is cut into so many; a piece has 3 samples
+    floor: float  # a lower bound on the costs
+
+
+class Lift(NamedTuple):
+    """Sums over all coordinates of products: of a piece v, its halves, its sag d, and w across."""
+
+    vv: float
+    first: float  # the first half, squared
+    second: float
+    dd: float
+    dv: float
+    dw: float
+    vw: float
+    ww: float
+
+
+class Costs(NamedTuple):
+    """The cost at the beginning, middle and end of a piece, and its difference along w."""
+
+    begin: float
+    middle: float
+    end: float
+    across: float
+
+
+# A path gains by bending to cheaper ground, but the formula holds for small gains only.
+MOST_SAVED = 0.05
+
+# The slope across is measured this far on either side, as a share of the length.
+ACROSS = 0.25
+
+# Pieces that exceed their chord by less than this share are straight enough.
+STRAIGHT = 1e-6
+
+
+@inner_kernel
+def flat(vx, vy, wx, wy):
+    """The sums over the two coordinates of the plane."""
+    vv = vx * vx + vy * vy
+    return Lift(vv, 0.25 * vv, 0.25 * vv, 0.0, 0.0, 0.0, vx * wx + vy * wy, wx * wx + wy * wy)
+
+
+@inner_kernel
+def plus_rise(lift, z0, z1, z2, w):
+    """The sums with one more layer: heights along the piece, and the rise along w."""
+    v, a, b, d = z2 - z0, z1 - z0, z2 - z1, z1 - 0.5 * (z0 + z2)
+    return Lift(
+        lift.vv + v * v,
+        lift.first + a * a,
+        lift.second + b * b,
+        lift.dd + d * d,
+        lift.dv + d * v,
+        lift.dw + d * w,
+        lift.vw + v * w,
+        lift.ww + w * w,
+    )
+
+
+@inner_kernel
+def exceeds_chord(lift):
+    """By how much a piece without costs exceeds its chord, as a share of it."""
+    one = sqrt(lift.vv)
+    return max((sqrt(lift.first) + sqrt(lift.second)) / one - 1.0, 0.0) * (4.0 / 3.0)
+
+
+@inner_kernel
+def left_by_bending(lift):
+    """The share of the excess that bending across leaves."""
+    across = lift.ww - lift.vw * lift.vw / lift.vv
+    sag = lift.dd - lift.dv * lift.dv / lift.vv
+    if not (across > 0.0 and sag > 0.0):
+        return 1.0
+    both = lift.dw - lift.dv * lift.vw / lift.vv
+    return max(1.0 - both * both / (across * sag), 0.0)
+
+
+@inner_kernel
+def mean_cost(lift, c):
+    """The mean of the cost along a piece, less what bending to cheaper ground saves."""
+    a, b, one = sqrt(lift.first), sqrt(lift.second), sqrt(lift.vv)
+    two = 0.5 * (a * (c.begin + c.middle) + b * (c.middle + c.end))
+    mean = (4.0 * two - 0.5 * one * (c.begin + c.end)) / (4.0 * (a + b) - one)
+    across = lift.ww - lift.vw * lift.vw / lift.vv
+    if not across > 0.0:
+        return mean
+    slope = (c.across - (c.end - c.begin) * lift.vw / lift.vv) / c.middle
+    saved = slope * slope / across * lift.vv / 24.0
+    return mean * (1.0 - min(saved, MOST_SAVED))
+
+
+@inner_kernel
+def bent(lift, excess):
+    """The length of a piece that exceeds its chord by a share ``excess`` where it is straight."""
+    if excess <= STRAIGHT:
+        return sqrt(lift.vv) * (1.0 + excess)
+    return sqrt(lift.vv) * (1.0 + excess * left_by_bending(lift))
+
+
+# Pieces between samples
+
+
+@inner_kernel
+def clamp(k, count):
+    return min(max(k, 0), count - 1)
+
+
+@kernel
+def sampled_piece(ground, i, j, ex, ey):
+    """The cost of the piece from sample (i, j) to (i, j) + 2 e, e in samples."""
+    rows, columns = ground.heights.shape[1], ground.heights.shape[2]
+    i1, j1, i2, j2 = i + ex, j + ey, i + 2 * ex, j + 2 * ey
+    il, ir = clamp(i1 + ey, columns), clamp(i1 - ey, columns)
+    jl, jr = clamp(j1 - ex, rows), clamp(j1 + ex, rows)
+    lift = flat(
+        2.0 * ex * ground.dx,
+        2.0 * ey * ground.dy,
+        0.5 * (ir - il) * ground.dx,
+        0.5 * (jr - jl) * ground.dy,
+    )
+    for layer in range(ground.heights.shape[0]):
+        z = ground.heights[layer]
+        w = 0.5 * (z[jr, ir] - z[jl, il])
+        lift = plus_rise(lift, z[j, i], z[j1, i1], z[j2, i2], w)
+    length = bent(lift, exceeds_chord(lift))
+    if ground.costs.shape[0] == 0:
+        return length
+    c = ground.costs[0]
+    costs = Costs(c[j, i], c[j1, i1], c[j2, i2], 0.5 * (c[jr, ir] - c[jl, il]))
+    return max(length * mean_cost(lift, costs), ground.floor * sqrt(lift.vv))
+
+
+class Place(NamedTuple):
+    """A place among the samples: the middle one of 3 x 3, and their weights."""
+
+    i: int
+    j: int
+    x0: float
+    x1: float
+    x2: float
+    y0: float
+    y1: float
+    y2: float
+
+
+@inner_kernel
+def place_at(ground, x, y):
+    """The weights of the quadratic through the samples around (x, y), in samples."""
+    i = min(max(int(x + 0.5), 1), ground.heights.shape[2] - 2)
+    j = min(max(int(y + 0.5), 1), ground.heights.shape[1] - 2)
+    a, b = x - i, y - j
+    return Place(
+        i,
+        j,
+        0.5 * a * (a - 1.0),
+        1.0 - a * a,
+        0.5 * a * (a + 1.0),
+        0.5 * b * (b - 1.0),
+        1.0 - b * b,
+        0.5 * b * (b + 1.0),
+    )
+
+
+@inner_kernel
+def row_at(values, layer, j, p):
+    i = p.i
+    return (
+        p.x0 * values[layer, j, i - 1]
+        + p.x1 * values[layer, j, i]
+        + p.x2 * values[layer, j, i + 1]
+    )
+
+
+@inner_kernel
+def read(values, layer, p):
+    """A layer at a place."""
+    return (
+        p.y0 * row_at(values, layer, p.j - 1, p)
+        + p.y1 * row_at(values, layer, p.j, p)
+        + p.y2 * row_at(values, layer, p.j + 1, p)
+    )
+
+
+@kernel
+def piece(ground, x0, y0, x2, y2):
+    """The cost of a piece between any two places, in samples."""
+    dx, dy = x2 - x0, y2 - y0
+    x1, y1 = 0.5 * (x0 + x2), 0.5 * (y0 + y2)
+    p0, p1, p2 = place_at(ground, x0, y0), place_at(ground, x1, y1), place_at(ground, x2, y2)
+    share = 1.0 / sqrt(dx * dx + dy * dy)
+    wx, wy = -dy * share, dx * share
+    lift = flat(dx * ground.dx, dy * ground.dy, wx * ground.dx, wy * ground.dy)
+    straight = lift
+    for layer in range(ground.heights.shape[0]):
+        z0 = read(ground.heights, layer, p0)
+        z1 = read(ground.heights, layer, p1)
+        straight = plus_rise(straight, z0, z1, read(ground.heights, layer, p2), 0.0)
+    excess = exceeds_chord(straight)
+    if excess <= STRAIGHT and ground.costs.shape[0] == 0:
+        return sqrt(straight.vv) * (1.0 + excess)
+    left, right = place_at(ground, x1 - wx, y1 - wy), place_at(ground, x1 + wx, y1 + wy)
+    for layer in range(ground.heights.shape[0]):
+        w = 0.5 * (read(ground.heights, layer, right) - read(ground.heights, layer, left))
+        z0 = read(ground.heights, layer, p0)
+        z1 = read(ground.heights, layer, p1)
+        lift = plus_rise(lift, z0, z1, read(ground.heights, layer, p2), w)
+    length = bent(lift, excess)
+    if ground.costs.shape[0] == 0:
+        return length
+    costs = Costs(
+        max(read(ground.costs, 0, p0), ground.floor),
+        max(read(ground.costs, 0, p1), ground.floor),
+        max(read(ground.costs, 0, p2), ground.floor),
+        0.5 * (read(ground.costs, 0, right) - read(ground.costs, 0, left)),
+    )
+    return max(length * mean_cost(lift, costs), ground.floor * sqrt(lift.vv))
+
+
+@kernel
+def gain_by_bending(ground, x0, y0, x2, y2):
+    """What a path between two places saves, beside its halves, by bending as a whole."""
+    dx, dy = x2 - x0, y2 - y0
+    x1, y1 = 0.5 * (x0 + x2), 0.5 * (y0 + y2)
+    wx, wy = -ACROSS * dy, ACROSS * dx
+    p0, p1, p2 = place_at(ground, x0, y0), place_at(ground, x1, y1), place_at(ground, x2, y2)
+    left, right = place_at(ground, x1 - wx, y1 - wy), place_at(ground, x1 + wx, y1 + wy)
+    lift = flat(dx * ground.dx, dy * ground.dy, wx * ground.dx, wy * ground.dy)
+    for layer in range(ground.heights.shape[0]):
+        z = ground.heights
+        w = 0.5 * (read(z, layer, right) - read(z, layer, left))
+        lift = plus_rise(lift, read(z, layer, p0), read(z, layer, p1), read(z, layer, p2), w)
+    halves = sqrt(lift.first) + sqrt(lift.second) - sqrt(lift.vv)
+    return ground.floor * max(halves, 0.0) * (1.0 - left_by_bending(lift))
+
+
+@kernel
+def ray(ground, x, y, dx, dy):
+    """The cost of the way from (x, y) to (x, y) + d, in samples, nearly straight."""
+    count = 1
+    while 2 * count < max(abs(dx), abs(dy)) - 1e-9:
+        count *= 2
+    cost = 0.0
+    for k in range(count):
+        a, b = k / count, (k + 1) / count
+        cost += piece(ground, x + a * dx, y + a * dy, x + b * dx, y + b * dy)
+    while count > 1:
+        count //= 2
+        for k in range(count):
+            a, b = k / count, (k + 1) / count
+            cost -= gain_by_bending(ground, x + a * dx, y + a * dy, x + b * dx, y + b * dy)
+    return cost
+
+
+# Pieces of the surface itself
+
+
+@kernel
+def surface_piece(surface, ax, ay, bx, by):
+    """The cost of a piece between two places, map units."""
+    vx, vy = bx - ax, by - ay
+    a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)
+    middle = spot_at(surface, ax + 0.5 * vx, ay + 0.5 * vy)
+    lift = flat(vx, vy, -vy, vx)
+    for layer in range(surface.weights.shape[0]):
+        weight, slope = surface.weights[layer], slope_at(surface, layer, middle)
+        z0, z2 = slope_at(surface, layer, a).f, slope_at(surface, layer, b).f
+        across = weight * (vx * slope.fy - vy * slope.fx)
+        lift = plus_rise(lift, weight * z0, weight * slope.f, weight * z2, across)
+    if not lift.vv > 0.0:
+        return 0.0
+    rise = log_cost_at(surface, ax + 0.5 * vx, ay + 0.5 * vy)
+    c = sqrt(squared_cost_at(surface, middle))
+    costs = Costs(
+        sqrt(squared_cost_at(surface, a)),
+        c,
+        sqrt(squared_cost_at(surface, b)),
+        c * (vx * rise.fy - vy * rise.fx),
+    )
+    cost = bent(lift, exceeds_chord(lift)) * mean_cost(lift, costs)
+    return max(cost, floor_of(surface) * sqrt(lift.vv))
+
+
+@kernel
+def surface_ray(surface, ax, ay, bx, by, count):
+    """The cost of the straight way between two places, map units, in so many pieces."""
+    cost, vx, vy = 0.0, (bx - ax) / count, (by - ay) / count
+    for k in range(count):
+        x, y = ax + k * vx, ay + k * vy
+        cost += surface_piece(surface, x, y, x + vx, y + vy)
+    return cost
+
+
+@kernel
+def fill_rays(surface, source, points, count, costs):
+    """The cost of the straight way from a source (2,) to each of the points (m, 2)."""
+    for m in range(points.shape[0]):
+        x, y = points[m, 0], points[m, 1]
+        costs[m] = surface_ray(surface, source[0], source[1], x, y, count)
