@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ..distance.field import Medium, march_from
+from ..distance.eikonal import Eikonal
 from ..distance.source import model_source, near_distance, window_radius
 from ..problem import Problem
 from ..space.lattice import Lattice
@@ -127,7 +127,7 @@ class Search:
 
     def __init__(self, problem: Problem, lattice: Lattice, cap: float) -> None:
         self.problem, self.lattice, self.cap = problem, lattice, cap
-        self.medium = Medium.around(problem.surface, lattice, _blocked_nodes(problem, lattice))
+        self.medium = Eikonal.around(problem.surface, lattice, _blocked_nodes(problem, lattice))
         self.model = model_source(
             lattice,
             problem.start,
@@ -276,9 +276,11 @@ def _check(length: float | None, target_gap: float | None, time_limit: float | N
 
 def known_length(problem: Problem) -> float:
     """The length of some path, map units; infinite where none is found on a coarse lattice."""
+    from ..distance.field import march_from
+    from ..distance.medium import Medium
+
     spacing = max(problem.bounds.width, problem.bounds.height) / SIDES[0]
     lattice = Lattice.spanning(problem.bounds, spacing)
-    medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
-    field = march_from(problem.surface, problem.free_space, problem.start, medium)
-    path = field.path_to(problem.goal)
+    medium = Medium(problem.surface, lattice, problem.free_space)
+    path = march_from(medium, problem.start).path_to(problem.goal)
     return math.inf if path is None else path.length

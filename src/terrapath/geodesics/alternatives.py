@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import shapely
 
-from ..distance.field import DistanceField, Medium, march_from
+from ..distance.field import DistanceField, march_from
+from ..distance.medium import Medium
 from ..errors import tell_unfinished
 from ..problem import Path, Problem
 from ..space.lattice import Lattice
@@ -53,11 +54,8 @@ def alternatives(
     if problem.start == problem.goal:
         return (problem.path([problem.start, problem.goal]),)
     lattice = Lattice.spanning(problem.bounds, spacing or problem.default_spacing)
-    medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
-    fields = [
-        march_from(problem.surface, problem.free_space, end, medium)
-        for end in (problem.start, problem.goal)
-    ]
+    medium = Medium(problem.surface, lattice, problem.free_space)
+    fields = [march_from(medium, end) for end in (problem.start, problem.goal)]
     failures: list[Exception] = []
     found = list(routes_of_fields(problem, fields[0], fields[1], count, failed=failures.append))
     if failures and not found:

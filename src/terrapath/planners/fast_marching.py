@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..distance.field import DistanceField, Medium, march_from
+from ..distance.field import DistanceField, march_from
+from ..distance.medium import Medium
 from ..problem import Path, Problem, Solution
 from ..space.lattice import Lattice
 from ..validation import require_positive
@@ -89,10 +90,8 @@ class _Run:
         """The distance field, solved as far as the time limit allows."""
         problem = self.problem
         self.total = lattice.nx * lattice.ny
-        medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
-        return march_from(
-            problem.surface, problem.free_space, problem.start, medium, watch=self.must_stop
-        )
+        medium = Medium(problem.surface, lattice, problem.free_space)
+        return march_from(medium, problem.start, watch=self.must_stop)
 
     def must_stop(self, settled: int) -> bool:
         self.settled = settled

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from ..distance.field import DistanceField, Medium, march_from
+from ..distance.field import DistanceField, march_from
+from ..distance.medium import Medium
 from ..errors import tell_unfinished
 from ..geodesics.alternatives import routes_of_fields, shortest
 from ..problem import Path, Problem, Solution, Status
@@ -107,7 +108,7 @@ class _Run:
         problem = self.problem
         for lattice in lattices(problem, self.planner.spacing):
             self.total = self.samples + 2 * lattice.nx * lattice.ny
-            medium = Medium.of_surface(problem.surface, lattice, problem.free_space)
+            medium = Medium(problem.surface, lattice, problem.free_space)
             from_start = self.march(problem.start, medium)
             self.direct = from_start.path_to(problem.goal)
             self.routes = () if self.direct is None else (self.direct,)
@@ -120,8 +121,7 @@ class _Run:
                 return
 
     def march(self, end: tuple[float, float], medium: Medium) -> DistanceField:
-        problem = self.problem
-        field = march_from(problem.surface, problem.free_space, end, medium, watch=self.must_stop)
+        field = march_from(medium, end, watch=self.must_stop)
         self.samples += round(field.reached * field.values.size)
         return field
 

@@ -1,10 +1,10 @@
 """Values between the nodes of a distance field, and paths back to the source.
 
-Where the field u is smooth, both follow from cubic interpolation. At kinks, where shortest paths
-from two sides meet, the scheme's own values are a little too low, and the slope of a cubic is a
-mean of both sides. Near obstacles and unsettled nodes there is no cubic. At such a point p, the
-value follows from Bellman's principle: the least of u(q) plus the length from q to p. Here q runs
-over a ring of nodes around p, and over the edges between them, as far as p can be seen from them.
+Where the field u is smooth, both follow from cubic interpolation of tau, its ratio to the chord. At
+kinks, where shortest paths from two sides meet, the slope of a cubic is a mean of both sides. Near
+obstacles and unsettled nodes there is no cubic. At such a point p, the value follows from Bellman's
+principle: the least of u(q) plus the cost from q to p. Here q runs over a ring of nodes around p,
+and over the edges between them, as far as p can be seen from them.
 """
 
 import math
@@ -14,99 +14,55 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import Grid, segment_is_free
-from ..surface.lengths import line_r
-from ..surface.surfaces import metric_at
-from .stencils import inverse
+from ..surface.lengths import inverse
+from ..surface.surfaces import floor_of, metric_at, slope_at as surface_slope_at, spot_at
+from .cubic import first_node, interpolate
+from .ground import surface_ray
 
 
 class Field(NamedTuple):
     """A distance field and where it lies."""
 
     u: np.ndarray  # (ny, nx) float64, infinite where not settled
+    tau: np.ndarray  # (ny, nx) float64: u over the chord without costs
     grid: Grid
     source_x: float
     source_y: float
+    lift: np.ndarray  # (layers,) float64: the weighted heights of the source
     has_obstacles: bool
 
 
 # Smooth places
 
 
-class Patch(NamedTuple):
-    """The value of u at a point, and its slope per node."""
+# By the eikonal equation the dual norm of the slope is 1. At a kink the slope of the cubic is a
+# mean of two, so its norm is less. A place is smooth where the norm is less by at most this share.
+ROUGH = 0.1
+
+
+class Chord(NamedTuple):
+    """The chord from the source without costs, and its slope per map unit."""
 
     value: float
     x: float
     y: float
 
 
-@inner_kernel
-def cubic(u):
-    """Weights of the four nodes around u in [0, 1] by cubic convolution (Keys 1981)."""
-    r = 1.0 - u
-    return (
-        -0.5 * u * r * r,
-        1.0 + u * u * (1.5 * u - 2.5),
-        1.0 + r * r * (1.5 * r - 2.5),
-        -0.5 * r * u * u,
-    )
-
-
-@inner_kernel
-def cubic_slope(u):
-    """First derivatives of ``cubic``."""
-    r = 1.0 - u
-    return (
-        -0.5 * r * (r - 2.0 * u),
-        u * (4.5 * u - 5.0),
-        r * (5.0 - 4.5 * r),
-        0.5 * u * (u - 2.0 * r),
-    )
-
-
-@inner_kernel
-def first_node(s, count):
-    """The first of the four nodes that the cubic at s uses, on an axis of ``count`` nodes."""
-    return min(max(math.floor(s) - 1, 0), count - 4)
-
-
-@inner_kernel
-def folded(w, cell, count):
-    """Weights of the four nodes. In the outermost cells one of them is extrapolated from three."""
-    if cell <= 0:
-        return w[1] + 3.0 * w[0], w[2] - 3.0 * w[0], w[3] + w[0], 0.0
-    if cell >= count - 2:
-        return 0.0, w[0] + w[3], w[1] - 3.0 * w[3], w[2] + 3.0 * w[3]
-    return w
-
-
 @kernel
-def interpolate(u, s, t):
-    """The field u (ny, nx) and its slopes at column s and row t; infinite near unsettled nodes."""
-    ny, nx = u.shape
-    i = min(max(math.floor(s), 0), nx - 2)
-    j = min(max(math.floor(t), 0), ny - 2)
-    wx, sx = folded(cubic(s - i), i, nx), folded(cubic_slope(s - i), i, nx)
-    wy, sy = folded(cubic(t - j), j, ny), folded(cubic_slope(t - j), j, ny)
-    i, j = first_node(s, nx), first_node(t, ny)
-    value, slope_x, slope_y = 0.0, 0.0, 0.0
-    for q in range(4):
-        row, row_slope = 0.0, 0.0
-        for p in range(4):
-            node = u[j + q, i + p]
-            if node == math.inf:
-                return Patch(math.inf, 0.0, 0.0)
-            row += wx[p] * node
-            row_slope += sx[p] * node
-        value += wy[q] * row
-        slope_x += wy[q] * row_slope
-        slope_y += sy[q] * row
-    return Patch(value, slope_x, slope_y)
-
-
-# By the eikonal equation the dual norm of the slope is 1. At a kink the slope of the cubic is a
-# mean of two, so its norm is less. A place is smooth where the norm is less by at most this share.
-ROUGH = 0.01
+def chord_at(surface, field, x, y):
+    """The chord at (x, y)."""
+    dx, dy = x - field.source_x, y - field.source_y
+    squared, gx, gy = dx * dx + dy * dy, dx, dy
+    spot = spot_at(surface, x, y)
+    for layer in range(surface.weights.shape[0]):
+        weight, slope = surface.weights[layer], surface_slope_at(surface, layer, spot)
+        rise = weight * slope.f - field.lift[layer]
+        squared += rise * rise
+        gx += rise * weight * slope.fx
+        gy += rise * weight * slope.fy
+    value = math.sqrt(squared)
+    share = 1.0 / value if value > 0.0 else 0.0
+    return Chord(value, share * gx, share * gy)
 
 
 class Slope(NamedTuple):
@@ -143,16 +99,18 @@ def slope_at(surface, space, field, x, y):
     s, t = (x - grid.x0) / grid.dx, (y - grid.y0) / grid.dy
     if min(grid.nx, grid.ny) < 4 or not (0.0 <= s <= grid.nx - 1 and 0.0 <= t <= grid.ny - 1):
         return ROUGH_PLACE
-    patch = interpolate(field.u, s, t)
+    patch = interpolate(field.tau, s, t)
     if patch.value == math.inf or (field.has_obstacles and not sees_cell(space, grid, x, y)):
         return ROUGH_PLACE
     d = inverse(metric_at(surface, x, y))
-    gx, gy = patch.x / grid.dx, patch.y / grid.dy
+    chord, tau = chord_at(surface, field, x, y), max(patch.value, floor_of(surface))
+    gx = tau * chord.x + chord.value * patch.x / grid.dx
+    gy = tau * chord.y + chord.value * patch.y / grid.dy
     vx, vy = d.h11 * gx + d.h12 * gy, d.h12 * gx + d.h22 * gy
     if not gx * vx + gy * vy >= (1.0 - ROUGH) * (1.0 - ROUGH):
         return ROUGH_PLACE
     size = math.hypot(vx, vy)
-    return Slope(patch.value, vx / size, vy / size)
+    return Slope(chord.value * tau, vx / size, vy / size)
 
 
 # Anywhere
@@ -171,9 +129,21 @@ class Approach(NamedTuple):
     level: float
 
 
-# Half the side of the ring around a point, in nodes. The scheme's values are too low within one or
-# two nodes of a kink; at this distance that makes no difference.
-RING = 3
+# Half the side of the ring around a point, in nodes.
+RING = 1
+
+
+@inner_kernel
+def nodes_apart(grid, ax, ay, bx, by):
+    """Distance between two points, in nodes."""
+    return math.hypot((ax - bx) / grid.dx, (ay - by) / grid.dy)
+
+
+@kernel
+def short_cost(surface, grid, ax, ay, bx, by):
+    """The cost of the straight way between two places, in pieces of at most a node."""
+    count = max(math.ceil(nodes_apart(grid, ax, ay, bx, by) - 1e-9), 1)
+    return surface_ray(surface, ax, ay, bx, by, count)
 
 
 @kernel
@@ -181,7 +151,7 @@ def better(surface, space, field, best, qx, qy, u, x, y):
     """The approach to (x, y) from q, if it is free and shorter than the best so far."""
     if not (u < best.end and u < best.level):
         return best
-    end = u + line_r(surface, qx, qy, x, y)
+    end = u + short_cost(surface, field.grid, qx, qy, x, y)
     if end < best.end and (not field.has_obstacles or segment_is_free(space, x, y, qx, qy)):
         return Approach(qx, qy, u, end, best.level)
     return best
@@ -289,12 +259,6 @@ def ring_is_open(space, field, ring, x, y):
     return True
 
 
-@inner_kernel
-def nodes_apart(grid, ax, ay, bx, by):
-    """Distance between two points, in nodes."""
-    return math.hypot((ax - bx) / grid.dx, (ay - by) / grid.dy)
-
-
 @kernel
 def approach(surface, space, field, x, y, level):
     """The best last segment of a path to (x, y), from nearby nodes or from the source.
@@ -321,7 +285,8 @@ def fill_distances(surface, space, field, points, values):
         x, y = points[m, 0], points[m, 1]
         values[m] = slope_at(surface, space, field, x, y).value
         if values[m] == math.inf:
-            values[m] = approach(surface, space, field, x, y, math.inf).end
+            value = approach(surface, space, field, x, y, math.inf).end
+            values[m] = max(value, floor_of(surface) * chord_at(surface, field, x, y).value)
 
 
 # Paths back to the source

@@ -15,6 +15,7 @@ import numpy as np
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
 from ..space.free_space import segment_is_free
+from ..surface.lengths import inverse
 from ..surface.metric_rows import H11, H12, H22, fill_row
 from ..surface.surfaces import Metric
 from .selling import Superbase, obtuse_superbase, products
@@ -49,13 +50,6 @@ AROUND = 8
 
 
 # Making stencils
-
-
-@inner_kernel
-def inverse(h):
-    """The tensor h^-1."""
-    determinant = h.h11 * h.h22 - h.h12 * h.h12
-    return Metric(h.h22 / determinant, -h.h12 / determinant, h.h11 / determinant)
 
 
 class Vector(NamedTuple):

@@ -6,13 +6,20 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..vec4 import four, four_in_row, sqrt, total
-from .surfaces import floor_of, speed_at, speeds_along, speeds_inside, spot_at, value_at
+from .surfaces import Metric, floor_of, speed_at, speeds_along, speeds_inside, spot_at, value_at
 
 
 @inner_kernel
 def norm(h, dx, dy):
     """Length sqrt(h(v, v)) of the vector v = (dx, dy)."""
     return sqrt(h.h11 * (dx * dx) + h.h12 * (2.0 * dx * dy) + h.h22 * (dy * dy))
+
+
+@inner_kernel
+def inverse(h):
+    """The tensor h^-1."""
+    determinant = h.h11 * h.h22 - h.h12 * h.h12
+    return Metric(h.h22 / determinant, -h.h12 / determinant, h.h11 / determinant)
 
 
 @inner_kernel

@@ -1,0 +1,192 @@
+"""A surface and its free space on a lattice, and the march of distances through it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from .._kernels.distance import calendar_queue, ground, hopf_lax, star
+from .._kernels.surface.metric_rows import columns_of, fill_samples
+from ..errors import InputError
+from ..space.free_space import FreeSpace
+from ..space.lattice import Lattice
+from ..surface import Surface
+from ..validation import Array, PointLike
+
+# The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
+BUCKET_SHARE = 4.0
+BUCKETS = 2**14
+
+# Nodes settled between two checks of the callback and of Ctrl-C.
+CHUNK = 100_000
+
+# The edges of all nodes are numbered in 31 bits; on the steepest ground a node has 64.
+MOST_NODES = (2**31 - 1) // (2 * star.HALF)
+
+# Nodes within this distance of the source, in nodes, are seeds: a straight way leads there.
+SEED_RADIUS = 1.5
+
+# A path along edges begins at a node within this distance of the goal, in nodes.
+REACH = 3.0
+
+# An edge between neighbouring nodes has at least three samples, and two for each feature of the
+# surface; but no more pieces than this.
+MOST_PIECES = 4
+
+# Is called with the number of nodes settled so far; returning True stops the march.
+Watch = Callable[[int], bool | None]
+
+
+class Medium:
+    """A surface and its free space on a lattice, prepared for marching from any source."""
+
+    def __init__(self, surface: Surface, lattice: Lattice, free_space: FreeSpace) -> None:
+        self.surface, self.lattice, self.free_space = surface, lattice, free_space
+        self.ground = _sample(surface, lattice)
+        self.stars = _lay_stars(self.ground, lattice, free_space)
+        self.data = hopf_lax.Medium(
+            self.ground, self.stars, free_space.data, lattice.data, free_space.has_obstacles
+        )
+
+    def march(
+        self, source: tuple[float, float], *, limit: float = math.inf, watch: Watch | None = None
+    ) -> tuple[Array, Array]:
+        """Distances from a source, map units, and these over the chord: both (ny, nx).
+
+        They are infinite where no edge leads. limit : nodes farther than this are not settled, map
+        units. watch : is called now and then with the number of nodes settled; returning True
+        stops the march.
+        """
+        lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
+        place = (np.asarray(source) - lattice.bounds[:2]) / (lattice.dx, lattice.dy)
+        begin = hopf_lax.Source(*map(float, place), lift_of(self.surface, source))
+        state = hopf_lax.State(
+            tau=np.full(count, math.inf),
+            best=np.full(count, hopf_lax.UNSEEN, np.uint8),
+            queued=np.zeros(count, np.uint8),
+            links=np.zeros(count, calendar_queue.LINK),
+        )
+        seeds, values = self._seeds(source, SEED_RADIUS)
+        front = self._front(values)
+        state.tau[seeds] = float(self.surface.cost(np.asarray(source)))
+        hopf_lax.plant(front, state, seeds, values)
+        settled, chunk = 0, CHUNK
+        while chunk == CHUNK:
+            chunk = hopf_lax.march(self.data, front, state, begin, CHUNK, float(limit))
+            settled += chunk
+            if watch is not None and watch(settled):
+                break
+        shape = (lattice.ny, lattice.nx)
+        return front.u.reshape(shape), state.tau.reshape(shape)
+
+    def _seeds(
+        self, source: PointLike, radius: float
+    ) -> tuple[npt.NDArray[np.int64], Array]:
+        """The nodes near a source that a free segment leads to, and their distances.
+
+        radius : in nodes.
+        """
+        lattice = self.lattice
+        place = (np.asarray(source) - lattice.bounds[:2]) / (lattice.dx, lattice.dy)
+        rows, columns = (
+            np.arange(max(math.ceil(at - radius), 0), min(math.floor(at + radius), last) + 1)
+            for at, last in ((place[1], lattice.ny - 1), (place[0], lattice.nx - 1))
+        )
+        columns, rows = (a.ravel() for a in np.meshgrid(columns.astype(int), rows.astype(int)))
+        points = np.column_stack([lattice.x[columns], lattice.y[rows]])
+        near = np.hypot(columns - place[0], rows - place[1]) <= radius
+        starts = np.broadcast_to(np.asarray(source), points.shape)
+        near &= self.free_space.segments_are_free(starts, points)
+        seeds = (rows * lattice.nx + columns)[near].astype(np.int64)
+        costs = np.empty(len(seeds))
+        pieces = 2 * self.ground.pieces
+        ground.fill_rays(
+            self.surface.data, np.asarray(source), np.ascontiguousarray(points[near]), pieces, costs
+        )
+        return seeds, costs
+
+    def edges_to(self, source: tuple[float, float], goal: Array) -> npt.NDArray[np.int64]:
+        """The nodes (k,) of the shortest path along edges from a goal (2,) to a source.
+
+        Raises LookupError where no edges lead from one to the other.
+        """
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import dijkstra
+
+        stars, count = self.stars, self.lattice.nx * self.lattice.ny
+        ends = [self._seeds(end, reach) for end, reach in ((goal, REACH), (source, SEED_RADIUS))]
+        steps = star.NORTH * self.lattice.nx + star.EAST
+        tails = np.repeat(np.arange(count), np.diff(stars.first))
+        # The two ends are two more nodes.
+        heads = [tails + steps[stars.directions], ends[0][0], np.full(len(ends[1][0]), count + 1)]
+        begins = [tails, np.full(len(ends[0][0]), count), ends[1][0]]
+        costs = np.concatenate([stars.costs, ends[0][1], ends[1][1]])
+        edges = (costs, (np.concatenate(begins), np.concatenate(heads)))
+        graph = csr_array(edges, shape=(count + 2, count + 2))
+        before = dijkstra(graph, indices=count, return_predecessors=True)[1]
+        path = [before[count + 1]]
+        while path[-1] != count:
+            if path[-1] < 0:
+                raise LookupError("no edges lead from the goal to the source")
+            path.append(before[path[-1]])
+        return np.asarray(path[-2::-1], np.int64)
+
+    def _front(self, values: Array) -> calendar_queue.Front:
+        lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
+        width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
+        width *= self.surface.typical_cost
+        front = calendar_queue.Front(
+            u=np.full(count, np.inf),
+            trial=np.full(count, np.inf),
+            heads=np.full(BUCKETS, -1, np.int32),
+            days_per_unit=1.0 / width,
+            counters=np.zeros(2, np.int64),
+        )
+        if len(values):
+            front.counters[calendar_queue.DAY] = int(values.min() / width)
+        return front
+
+
+def _sample(surface: Surface, lattice: Lattice) -> ground.Ground:
+    """Heights and costs between and at the nodes."""
+    features = max(lattice.dx, lattice.dy) / surface.resolution
+    pieces = min(max(math.ceil(features - 1e-9), 1), MOST_PIECES)
+    per = 2 * pieces
+    grid = lattice.data._replace(
+        dx=lattice.dx / per,
+        dy=lattice.dy / per,
+        nx=(lattice.nx - 1) * per + 1,
+        ny=(lattice.ny - 1) * per + 1,
+    )
+    heights = np.empty((len(surface.data.weights), grid.ny, grid.nx))
+    costs = np.empty((1 if surface.costs else 0, grid.ny, grid.nx))
+    fill_samples(surface.data, grid, columns_of(surface.data, grid), heights, costs)
+    return ground.Ground(heights, costs, grid.dx, grid.dy, pieces, surface.least_cost)
+
+
+def _lay_stars(samples: ground.Ground, lattice: Lattice, free_space: FreeSpace) -> star.Stars:
+    """The edges that a march needs, without those that touch an obstacle."""
+    count = lattice.nx * lattice.ny
+    if count > MOST_NODES:
+        raise InputError(
+            f"the lattice has {lattice.nx:,} x {lattice.ny:,} nodes, more than {MOST_NODES:,} in "
+            "all; give a wider spacing"
+        )
+    ahead, back = np.zeros(count, np.uint32), np.zeros(count, np.uint32)
+    first = np.zeros(count + 1, np.int32)
+    star.choose_edges(samples, lattice.nx, lattice.ny, ahead, back)
+    if free_space.has_obstacles:
+        star.cut_edges(free_space.data, lattice.data, ahead, back)
+    star.count_edges(ahead, back, first)
+    edges = int(first[-1])
+    stars = star.Stars(first, np.empty(edges, np.uint8), np.empty(edges, np.float32))
+    star.lay_edges(samples, lattice.nx, ahead, back, stars)
+    return stars
+
+
+def lift_of(surface: Surface, point: PointLike) -> Array:
+    """The weighted heights (layers,) of a point, map units."""
+    return np.ascontiguousarray(surface.lift(np.asarray(point))[2:])
