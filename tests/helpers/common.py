@@ -31,6 +31,11 @@ def points_in(bounds, count, seed=0):
     return np.random.default_rng(seed).uniform(bounds[:2], bounds[2:], (count, 2))
 
 
+def fitted_order(sizes, errors):
+    """The power of the sizes with which the errors fall."""
+    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+
+
 def one_line(caught):
     """The message of an error, checked to be one line."""
     text = str(caught.value)

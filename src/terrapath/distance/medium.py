@@ -35,6 +35,8 @@ REACH = 3.0
 # An edge between neighbouring nodes has at least three samples, and two for each feature of the
 # surface; but no more pieces than this.
 MOST_PIECES = 4
+# On smooth ground a piece may be longer than an edge: a feature of the surface has so many.
+PIECES_PER_FEATURE = 0.5
 
 # Is called with the number of nodes settled so far; returning True stops the march.
 Watch = Callable[[int], bool | None]
@@ -82,9 +84,7 @@ class Medium:
         shape = (lattice.ny, lattice.nx)
         return front.u.reshape(shape), state.tau.reshape(shape)
 
-    def _seeds(
-        self, source: PointLike, radius: float
-    ) -> tuple[npt.NDArray[np.int64], Array]:
+    def _seeds(self, source: PointLike, radius: float) -> tuple[npt.NDArray[np.int64], Array]:
         """The nodes near a source that a free segment leads to, and their distances.
 
         radius : in nodes.
@@ -164,7 +164,8 @@ def _sample(surface: Surface, lattice: Lattice) -> ground.Ground:
     heights = np.empty((len(surface.data.weights), grid.ny, grid.nx))
     costs = np.empty((1 if surface.costs else 0, grid.ny, grid.nx))
     fill_samples(surface.data, grid, columns_of(surface.data, grid), heights, costs)
-    return ground.Ground(heights, costs, grid.dx, grid.dy, pieces, surface.least_cost)
+    reach = 2.0 * max(1.0, PIECES_PER_FEATURE / features) if features > 0.0 else math.inf
+    return ground.Ground(heights, costs, grid.dx, grid.dy, pieces, reach, surface.least_cost)
 
 
 def _lay_stars(samples: ground.Ground, lattice: Lattice, free_space: FreeSpace) -> star.Stars:

@@ -28,6 +28,7 @@ class Ground(NamedTuple):
     dx: float  # distance of samples, map units
     dy: float
     pieces: int  # an edge between neighbouring nodes is cut into so many; a piece has 3 samples
+    reach: float  # a longer way is cut into pieces of at most this, in samples
     floor: float  # a lower bound on the costs
 
 
@@ -194,9 +195,7 @@ def place_at(ground, x, y):
 def row_at(values, layer, j, p):
     i = p.i
     return (
-        p.x0 * values[layer, j, i - 1]
-        + p.x1 * values[layer, j, i]
-        + p.x2 * values[layer, j, i + 1]
+        p.x0 * values[layer, j, i - 1] + p.x1 * values[layer, j, i] + p.x2 * values[layer, j, i + 1]
     )
 
 
@@ -266,7 +265,7 @@ def gain_by_bending(ground, x0, y0, x2, y2):
 def ray(ground, x, y, dx, dy):
     """The cost of the way from (x, y) to (x, y) + d, in samples, nearly straight."""
     count = 1
-    while 2 * count < max(abs(dx), abs(dy)) - 1e-9:
+    while ground.reach * count < max(abs(dx), abs(dy)) - 1e-9:
         count *= 2
     cost = 0.0
     for k in range(count):

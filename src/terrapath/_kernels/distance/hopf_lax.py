@@ -242,9 +242,7 @@ def bend_of(medium, front, state, source, n, ka, kb):
         return 0.0
     i, j = n % nx, n // nx
     ex, ey = EAST[kb] - EAST[ka], NORTH[kb] - NORTH[ka]
-    before = bend_beyond(
-        medium, front, state, source, a, b, i + EAST[ka] - ex, j + NORTH[ka] - ey
-    )
+    before = bend_beyond(medium, front, state, source, a, b, i + EAST[ka] - ex, j + NORTH[ka] - ey)
     after = bend_beyond(medium, front, state, source, b, a, i + EAST[kb] + ex, j + NORTH[kb] + ey)
     if math.isnan(before):
         return 0.0 if math.isnan(after) else after
@@ -339,14 +337,8 @@ def offer(medium, front, state, source, n):
     for e in range(stars.first[n], stars.first[n + 1]):
         k = np.int64(stars.directions[e])
         x, value = n + offset_of(medium, k), front.u[n] + np.float64(stars.costs[e])
-        back = (k + HALF) % (2 * HALF)
-        if front.u[x] < math.inf:
-            if value < front.u[x] * (1.0 - GAIN):
-                if not (state.queued[x] and value >= front.trial[x]):
-                    state.best[x] = back
-                    queue_up(front, state, x, value)
-        elif value < front.trial[x]:
-            state.best[x] = back
+        if value < front.trial[x] and value < front.u[x] * (1.0 - GAIN):
+            state.best[x] = (k + HALF) % (2 * HALF)
             queue_up(front, state, x, value)
 
 

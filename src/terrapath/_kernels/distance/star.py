@@ -7,6 +7,7 @@ that are less. An edge leads both ways and is in the stars of both nodes.
 """
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ def _directions(levels):
     """The vectors of the Stern-Brocot tree down to a level, all around, by their angle."""
     quadrant = [(1, 0), (0, 1)]
     for _ in range(levels):
-        between = [(a + c, b + d) for (a, b), (c, d) in zip(quadrant, quadrant[1:], strict=False)]
+        between = [(a + c, b + d) for (a, b), (c, d) in pairwise(quadrant)]
         quadrant = [v for pair in zip(quadrant, between, strict=False) for v in pair] + [(0, 1)]
     turned = quadrant[:-1]
     around = []
@@ -189,7 +190,9 @@ def edge_cost(ground, i, j, k):
     """The cost of the edge along direction k from node (i, j), rounded up to 32 bits."""
     per = 2 * ground.pieces
     ex, ey = EAST[k], NORTH[k]
-    if k % EIGHTH:
+    if 2 * ground.pieces * max(abs(ex), abs(ey)) <= ground.reach:
+        cost = sampled_piece(ground, per * i, per * j, ground.pieces * ex, ground.pieces * ey)
+    elif k % EIGHTH:
         cost = ray(ground, float(per * i), float(per * j), float(per * ex), float(per * ey))
     else:
         cost = 0.0
