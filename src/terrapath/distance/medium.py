@@ -49,8 +49,16 @@ class Medium:
         self.surface, self.lattice, self.free_space = surface, lattice, free_space
         self.ground = _sample(surface, lattice)
         self.stars = _lay_stars(self.ground, lattice, free_space)
+        self.steps = star.NORTH * lattice.nx + star.EAST
+        per = 2 * self.ground.pieces
         self.data = hopf_lax.Medium(
-            self.ground, self.stars, free_space.data, lattice.data, free_space.has_obstacles
+            self.ground,
+            np.stack([z[::per, ::per].ravel() for z in self.ground.heights], axis=-1),
+            self.stars,
+            self.steps,
+            free_space.data,
+            lattice.data,
+            free_space.has_obstacles,
         )
 
     def march(
@@ -67,7 +75,7 @@ class Medium:
         begin = hopf_lax.Source(*map(float, place), lift_of(self.surface, source))
         state = hopf_lax.State(
             tau=np.full(count, math.inf),
-            best=np.full(count, hopf_lax.UNSEEN, np.uint8),
+            best=np.full(count, hopf_lax.SEED, np.uint8),
             queued=np.zeros(count, np.uint8),
             links=np.zeros(count, calendar_queue.LINK),
         )
@@ -118,10 +126,9 @@ class Medium:
 
         stars, count = self.stars, self.lattice.nx * self.lattice.ny
         ends = [self._seeds(end, reach) for end, reach in ((goal, REACH), (source, SEED_RADIUS))]
-        steps = star.NORTH * self.lattice.nx + star.EAST
         tails = np.repeat(np.arange(count), np.diff(stars.first))
         # The two ends are two more nodes.
-        heads = [tails + steps[stars.directions], ends[0][0], np.full(len(ends[1][0]), count + 1)]
+        heads = [tails + self.steps[stars.directions], ends[0][0], np.full(len(ends[1][0]), count + 1)]
         begins = [tails, np.full(len(ends[0][0]), count), ends[1][0]]
         costs = np.concatenate([stars.costs, ends[0][1], ends[1][1]])
         edges = (costs, (np.concatenate(begins), np.concatenate(heads)))

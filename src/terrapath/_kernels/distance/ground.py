@@ -135,7 +135,7 @@ def clamp(k, count):
     return min(max(k, 0), count - 1)
 
 
-@kernel
+@inner_kernel
 def sampled_piece(ground, i, j, ex, ey):
     """The cost of the piece from sample (i, j) to (i, j) + 2 e, e in samples."""
     rows, columns = ground.heights.shape[1], ground.heights.shape[2]
@@ -161,7 +161,7 @@ def sampled_piece(ground, i, j, ex, ey):
 
 
 class Place(NamedTuple):
-    """A place among the samples: the middle one of 3 x 3, and their weights."""
+    """A place among the samples: the middle one of 3 x 3, their weights, and where it is there."""
 
     i: int
     j: int
@@ -171,6 +171,8 @@ class Place(NamedTuple):
     y0: float
     y1: float
     y2: float
+    a: float
+    b: float
 
 
 @inner_kernel
@@ -188,6 +190,8 @@ def place_at(ground, x, y):
         0.5 * b * (b - 1.0),
         1.0 - b * b,
         0.5 * b * (b + 1.0),
+        a,
+        b,
     )
 
 
@@ -209,37 +213,45 @@ def read(values, layer, p):
     )
 
 
-@kernel
+@inner_kernel
+def slope_along(values, layer, p, wx, wy):
+    """The slope of a layer at a place along w, per sample."""
+    rows = (
+        row_at(values, layer, p.j - 1, p),
+        row_at(values, layer, p.j, p),
+        row_at(values, layer, p.j + 1, p),
+    )
+    rise = (p.b - 0.5) * rows[0] - 2.0 * p.b * rows[1] + (p.b + 0.5) * rows[2]
+    run = 0.0
+    for k in range(3):
+        y = p.y0 if k == 0 else p.y1 if k == 1 else p.y2
+        run += y * (
+            (p.a - 0.5) * values[layer, p.j - 1 + k, p.i - 1]
+            - 2.0 * p.a * values[layer, p.j - 1 + k, p.i]
+            + (p.a + 0.5) * values[layer, p.j - 1 + k, p.i + 1]
+        )
+    return wx * run + wy * rise
+
+
+@inner_kernel
 def piece(ground, x0, y0, x2, y2):
     """The cost of a piece between any two places, in samples."""
     dx, dy = x2 - x0, y2 - y0
-    x1, y1 = 0.5 * (x0 + x2), 0.5 * (y0 + y2)
-    p0, p1, p2 = place_at(ground, x0, y0), place_at(ground, x1, y1), place_at(ground, x2, y2)
-    share = 1.0 / sqrt(dx * dx + dy * dy)
-    wx, wy = -dy * share, dx * share
-    lift = flat(dx * ground.dx, dy * ground.dy, wx * ground.dx, wy * ground.dy)
-    straight = lift
-    for layer in range(ground.heights.shape[0]):
-        z0 = read(ground.heights, layer, p0)
-        z1 = read(ground.heights, layer, p1)
-        straight = plus_rise(straight, z0, z1, read(ground.heights, layer, p2), 0.0)
-    excess = exceeds_chord(straight)
-    if excess <= STRAIGHT and ground.costs.shape[0] == 0:
-        return sqrt(straight.vv) * (1.0 + excess)
-    left, right = place_at(ground, x1 - wx, y1 - wy), place_at(ground, x1 + wx, y1 + wy)
-    for layer in range(ground.heights.shape[0]):
-        w = 0.5 * (read(ground.heights, layer, right) - read(ground.heights, layer, left))
-        z0 = read(ground.heights, layer, p0)
-        z1 = read(ground.heights, layer, p1)
-        lift = plus_rise(lift, z0, z1, read(ground.heights, layer, p2), w)
-    length = bent(lift, excess)
+    p0, p2 = place_at(ground, x0, y0), place_at(ground, x2, y2)
+    p1 = place_at(ground, 0.5 * (x0 + x2), 0.5 * (y0 + y2))
+    lift = flat(dx * ground.dx, dy * ground.dy, -dy * ground.dx, dx * ground.dy)
+    z = ground.heights
+    for layer in range(z.shape[0]):
+        across = slope_along(z, layer, p1, -dy, dx)
+        lift = plus_rise(lift, read(z, layer, p0), read(z, layer, p1), read(z, layer, p2), across)
+    length = bent(lift, exceeds_chord(lift))
     if ground.costs.shape[0] == 0:
         return length
     costs = Costs(
         max(read(ground.costs, 0, p0), ground.floor),
         max(read(ground.costs, 0, p1), ground.floor),
         max(read(ground.costs, 0, p2), ground.floor),
-        0.5 * (read(ground.costs, 0, right) - read(ground.costs, 0, left)),
+        slope_along(ground.costs, 0, p1, -dy, dx),
     )
     return max(length * mean_cost(lift, costs), ground.floor * sqrt(lift.vv))
 
@@ -261,7 +273,7 @@ def gain_by_bending(ground, x0, y0, x2, y2):
     return ground.floor * max(halves, 0.0) * (1.0 - left_by_bending(lift))
 
 
-@kernel
+@inner_kernel
 def ray(ground, x, y, dx, dy):
     """The cost of the way from (x, y) to (x, y) + d, in samples, nearly straight."""
     count = 1

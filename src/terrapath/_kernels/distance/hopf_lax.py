@@ -5,8 +5,8 @@ neighbours in its star. Values are factored by the chord d from the source, u = 
 tau is linear and d exact. So no value is below the chord, planes are exact, and near the source
 nothing special is needed. Where tau bends, its second differences make the scheme second order.
 
-Nodes are queued by what their edges offer. A node that is settled looks at the two segments beside
-its best edge (Mirebeau 2014: in stars without wide angles the places that matter are less).
+Nodes are queued by what their edges offer. A node that is settled looks at the segment beside its
+best edge, on the side that offers less (Mirebeau 2014: in stars without wide angles the places that matter are less).
 A node that is offered less later is queued again.
 """
 
@@ -34,7 +34,9 @@ class Medium(NamedTuple):
     """The lattice and all that a march needs to know of the ground."""
 
     ground: object  # Ground
+    heights: np.ndarray  # (n, layers) float64: weighted, of the nodes
     stars: object  # Stars
+    steps: np.ndarray  # (64,) int64: each direction as a difference of node numbers
     space: object  # Space
     grid: object  # Grid, of the nodes
     has_obstacles: bool
@@ -44,14 +46,14 @@ class State(NamedTuple):
     """What is known of the nodes."""
 
     tau: np.ndarray  # (n,) float64: u over the chord
-    best: np.ndarray  # (n,) uint8: the direction of the edge that offers least; SEED, UNSEEN
+    best: np.ndarray  # (n,) uint8: the direction of the edge that offers least, or SEED
     queued: np.ndarray  # (n,) uint8
     links: np.ndarray  # (n,) of calendar_queue.LINK
 
 
-SEED, UNSEEN = 254, 255
+SEED = 255
 
-# What is offered to a settled node is less by more than this share, or it is left out.
+# A settled node is queued again for values that are less by more than this share.
 GAIN = 1e-6
 
 # A node this near to the source, in nodes, is the source.
@@ -63,57 +65,39 @@ CLOSE = 1.5
 MOST_CORRECTED = 0.03
 
 
-@inner_kernel
-def lifted_height(medium, layer, n):
-    """The weighted height of a node."""
-    ground, nx = medium.ground, medium.grid.nx
-    per = 2 * ground.pieces
-    return ground.heights[layer, per * (n // nx), per * (n % nx)]
+class Node(NamedTuple):
+    """A node, its column and row, and how far these are from the source, map units."""
+
+    n: int
+    i: int
+    j: int
+    x: float
+    y: float
 
 
 @inner_kernel
-def offset_of(medium, direction):
-    """A direction as a difference of node numbers."""
-    return NORTH[direction] * medium.grid.nx + EAST[direction]
-
-
-@inner_kernel
-def nodes_from(medium, source, n):
-    """How many nodes a node is from the source."""
-    nx = medium.grid.nx
-    return math.hypot(n % nx - source.x, n // nx - source.y)
-
-
-@kernel
-def chord_to_node(medium, source, n):
-    """The chord from the source to a node, without costs, map units."""
+def node_of(medium, source, n):
     grid = medium.grid
-    x, y = (n % grid.nx - source.x) * grid.dx, (n // grid.nx - source.y) * grid.dy
-    squared = x * x + y * y
+    j = n // grid.nx
+    i = n - j * grid.nx
+    return Node(n, i, j, (i - source.x) * grid.dx, (j - source.y) * grid.dy)
+
+
+@inner_kernel
+def chord_of(medium, source, node):
+    """The chord from the source to a node, without costs, map units."""
+    squared = node.x * node.x + node.y * node.y
     for layer in range(source.lift.shape[0]):
-        rise = lifted_height(medium, layer, n) - source.lift[layer]
+        rise = medium.heights[node.n, layer] - source.lift[layer]
         squared += rise * rise
     return math.sqrt(squared)
 
 
-@kernel
-def chord_to_place(medium, source, x, y):
-    """The chord from the source to a place, in nodes, map units."""
-    ground, grid = medium.ground, medium.grid
-    dx, dy = (x - source.x) * grid.dx, (y - source.y) * grid.dy
-    squared = dx * dx + dy * dy
-    place = place_at(ground, 2 * ground.pieces * x, 2 * ground.pieces * y)
-    for layer in range(source.lift.shape[0]):
-        rise = read(ground.heights, layer, place) - source.lift[layer]
-        squared += rise * rise
-    return math.sqrt(squared)
-
-
-# The segment between two neighbours a and b of a node x, in R^n
+# The segment between two neighbours a and b of a node, in R^n
 
 
 class Segment(NamedTuple):
-    """Products of the lifts a and b - a from x, and of a from the source."""
+    """Products of the lifts a and b - a from the node, and of a from the source."""
 
     aa: float
     ae: float
@@ -123,34 +107,32 @@ class Segment(NamedTuple):
 
 
 @inner_kernel
-def segment_between(medium, source, n, ka, kb):
+def segment_between(medium, source, node, ka, kb):
     """The segment between the ends of two directions."""
-    grid = medium.grid
-    a, b = n + offset_of(medium, ka), n + offset_of(medium, kb)
+    grid, z = medium.grid, medium.heights
+    n, a, b = node.n, node.n + medium.steps[ka], node.n + medium.steps[kb]
     ax, ay = EAST[ka] * grid.dx, NORTH[ka] * grid.dy
     ex, ey = EAST[kb] * grid.dx - ax, NORTH[kb] * grid.dy - ay
-    sx = (n % grid.nx - source.x) * grid.dx + ax
-    sy = (n // grid.nx - source.y) * grid.dy + ay
+    sx, sy = node.x + ax, node.y + ay
     aa, ae, ee = ax * ax + ay * ay, ax * ex + ay * ey, ex * ex + ey * ey
     ss, se = sx * sx + sy * sy, sx * ex + sy * ey
     for layer in range(source.lift.shape[0]):
-        za = lifted_height(medium, layer, a)
-        az, ez = za - lifted_height(medium, layer, n), lifted_height(medium, layer, b) - za
-        sz = za - source.lift[layer]
+        az, ez = z[a, layer] - z[n, layer], z[b, layer] - z[a, layer]
+        sz = z[a, layer] - source.lift[layer]
         aa, ae, ee = aa + az * az, ae + az * ez, ee + ez * ez
         ss, se = ss + sz * sz, se + sz * ez
     return Segment(aa, ae, ee, ss, se)
 
 
 class Place(NamedTuple):
-    """A place a + t (b - a) on a segment, and the value that it offers."""
+    """The value that is offered from t of the way to the end of a direction."""
 
     value: float
+    direction: int
     t: float
 
 
-# Where the value rises along a segment at this rate at its beginning, its least is there.
-UPHILL = 0.35
+NOWHERE = Place(math.inf, 0, 0.0)
 
 
 @inner_kernel
@@ -162,9 +144,20 @@ def value_on(g, t, ca, cb, ta, tb):
     return c * near + tau * far
 
 
-@kernel
+# Where the value rises along a segment at this rate at its beginning, its least is there.
+UPHILL = 0.35
+
+# The least is at the beginning where t is no more than this.
+LEAST_T = 1e-6
+
+
+@inner_kernel
 def improved(g, t, ca, cb, ta, tb):
-    """The t of the least value, by a step of Newton's method."""
+    """A step of Newton's method to the t of the least value.
+
+    The value at a + t (b - a) is c times the chord to the node, plus tau times the chord from the
+    source; c and tau are linear in t.
+    """
     c, tau = ca + t * (cb - ca), ta + t * (tb - ta)
     near = math.sqrt(max(g.aa + t * (2.0 * g.ae + t * g.ee), 0.0))
     far = math.sqrt(max(g.ss + t * (2.0 * g.se + t * g.ee), 0.0))
@@ -178,33 +171,28 @@ def improved(g, t, ca, cb, ta, tb):
 
 
 @inner_kernel
-def least_on(g, ca, cb, ta, tb, ua, ub):
-    """The place of a segment that offers least; infinite where that is its beginning."""
-    length, near = math.sqrt(g.ee), math.sqrt(g.aa)
-    c = 0.5 * (ca + cb)
+def place_of_least(g, ca, cb, ta, tb, ua, ub):
+    """The t of the place on a segment that offers least; 0 where that is its beginning."""
+    near, c = math.sqrt(g.aa), 0.5 * (ca + cb)
     rise = ub - ua + (cb - ca) * near
-    if rise + c * g.ae / near > UPHILL * c * length:
-        return Place(math.inf, 0.0)
-    across = max(g.aa - g.ae * g.ae / g.ee, 0.0)
+    if rise + c * g.ae / near > UPHILL * c * math.sqrt(g.ee):
+        return 0.0
     room = c * c * g.ee - rise * rise
     t = 0.5
     if room > 0.0:
+        across = max(g.aa - g.ae * g.ae / g.ee, 0.0)
         t = -g.ae / g.ee - rise * math.sqrt(across / (g.ee * room))
-    t = improved(g, min(max(t, 0.0), 1.0), ca, cb, ta, tb)
-    if t <= 1e-6:
-        return Place(math.inf, 0.0)
-    return Place(value_on(g, t, ca, cb, ta, tb), t)
+    return improved(g, min(max(t, 0.0), 1.0), ca, cb, ta, tb)
 
 
 # A node
 
 
 @inner_kernel
-def cost_per_chord(medium, n, entry, aa):
-    """What an edge costs, over its chord; 32 bits do not show less than GAIN."""
-    ratio = np.float64(medium.stars.costs[entry]) / math.sqrt(aa)
-    floor = medium.ground.floor
-    return floor if ratio < floor * (1.0 + 2e-7) else ratio
+def cost_per_chord(medium, entry, chord):
+    """What an edge costs, over its chord; 32 bits show no less than 2^-23 above the floor."""
+    ratio, floor = np.float64(medium.stars.costs[entry]) / chord, medium.ground.floor
+    return floor if ratio < floor * (1.0 + 2.5e-7) else ratio
 
 
 @inner_kernel
@@ -212,38 +200,43 @@ def is_clear(medium, n, ka, kb):
     """May a path to n begin anywhere between the ends of two directions?"""
     if not medium.has_obstacles:
         return True
-    a, between = n + offset_of(medium, ka), direction_between(ka, kb)
+    a, between = n + medium.steps[ka], direction_between(ka, kb)
     if between >= 0 and entry_of(medium.stars, a, between) >= 0:
         return True
-    grid, b = medium.grid, n + offset_of(medium, kb)
+    grid, b = medium.grid, n + medium.steps[kb]
     ax, ay = grid.x0 + a % grid.nx * grid.dx, grid.y0 + a // grid.nx * grid.dy
     bx, by = grid.x0 + b % grid.nx * grid.dx, grid.y0 + b // grid.nx * grid.dy
     return segment_is_free(medium.space, ax, ay, bx, by)
 
 
 @inner_kernel
-def bend_beyond(medium, front, state, source, a, b, i, j):
-    """The second difference of tau at a and b, and the node (i, j) beyond a; NaN where unknown."""
+def is_close(medium, node, di, dj):
+    """Is the node (di, dj) away from this one within CLOSE nodes of the source?"""
+    x, y = node.x / medium.grid.dx + di, node.y / medium.grid.dy + dj
+    return x * x + y * y <= CLOSE * CLOSE
+
+
+@inner_kernel
+def bend_beyond(medium, front, state, node, a, b, di, dj):
+    """The second difference of tau at a; (di, dj) leads beyond it from b. NaN where unknown."""
     grid = medium.grid
-    if not (0 <= i < grid.nx and 0 <= j < grid.ny):
+    if not (0 <= node.i + di < grid.nx and 0 <= node.j + dj < grid.ny):
         return math.nan
-    n = j * grid.nx + i
-    if front.u[n] == math.inf or nodes_from(medium, source, n) <= CLOSE:
+    n = node.n + dj * grid.nx + di
+    if front.u[n] == math.inf or is_close(medium, node, di, dj):
         return math.nan
     return state.tau[n] - 2.0 * state.tau[a] + state.tau[b]
 
 
 @inner_kernel
-def bend_of(medium, front, state, source, n, ka, kb):
+def bend_of(medium, front, state, node, ka, kb):
     """The second difference of tau along a segment: the smaller of those on its two sides."""
-    nx = medium.grid.nx
-    a, b = n + offset_of(medium, ka), n + offset_of(medium, kb)
-    if min(nodes_from(medium, source, a), nodes_from(medium, source, b)) <= CLOSE:
+    ai, aj, bi, bj = EAST[ka], NORTH[ka], EAST[kb], NORTH[kb]
+    if is_close(medium, node, ai, aj) or is_close(medium, node, bi, bj):
         return 0.0
-    i, j = n % nx, n // nx
-    ex, ey = EAST[kb] - EAST[ka], NORTH[kb] - NORTH[ka]
-    before = bend_beyond(medium, front, state, source, a, b, i + EAST[ka] - ex, j + NORTH[ka] - ey)
-    after = bend_beyond(medium, front, state, source, b, a, i + EAST[kb] + ex, j + NORTH[kb] + ey)
+    a, b = node.n + medium.steps[ka], node.n + medium.steps[kb]
+    before = bend_beyond(medium, front, state, node, a, b, 2 * ai - bi, 2 * aj - bj)
+    after = bend_beyond(medium, front, state, node, b, a, 2 * bi - ai, 2 * bj - aj)
     if math.isnan(before):
         return 0.0 if math.isnan(after) else after
     if math.isnan(after):
@@ -253,57 +246,56 @@ def bend_of(medium, front, state, source, n, ka, kb):
     return before if abs(before) < abs(after) else after
 
 
-@kernel
-def value_through(medium, front, state, source, n, ka, kb, t):
-    """The value of node n through the place t between two of its neighbours."""
-    nx, per = medium.grid.nx, 2.0 * medium.ground.pieces
-    a, b = n + offset_of(medium, ka), n + offset_of(medium, kb)
+@inner_kernel
+def value_through(medium, front, state, source, node, ka, kb, t):
+    """The value of a node through the place t between two of its neighbours."""
+    ground, per = medium.ground, 2.0 * medium.ground.pieces
+    a, b = node.n + medium.steps[ka], node.n + medium.steps[kb]
     dx, dy = EAST[ka] + t * (EAST[kb] - EAST[ka]), NORTH[ka] + t * (NORTH[kb] - NORTH[ka])
-    x, y = float(n % nx), float(n // nx)
-    cost = ray(medium.ground, per * x, per * y, per * dx, per * dy)
-    chord = chord_to_place(medium, source, x + dx, y + dy)
+    cost = ray(ground, per * node.i, per * node.j, per * dx, per * dy)
+    x, y = node.x + dx * medium.grid.dx, node.y + dy * medium.grid.dy
+    place = place_at(ground, per * (node.i + dx), per * (node.j + dy))
+    squared = x * x + y * y
+    for layer in range(source.lift.shape[0]):
+        rise = read(ground.heights, layer, place) - source.lift[layer]
+        squared += rise * rise
+    chord = math.sqrt(squared)
     tau = state.tau[a] + t * (state.tau[b] - state.tau[a])
-    bend = -0.5 * t * (1.0 - t) * bend_of(medium, front, state, source, n, ka, kb)
+    bend = -0.5 * t * (1.0 - t) * bend_of(medium, front, state, node, ka, kb)
     if abs(bend) * chord <= MOST_CORRECTED * cost:
         tau += bend
-    return cost + chord * max(tau, medium.ground.floor)
+    return cost + chord * max(tau, ground.floor)
 
 
-@kernel
-def beside_edge(medium, front, state, source, n, e, side):
-    """The best place between the ends of edge e and of the one beside it."""
-    stars = medium.stars
-    other = beside(stars, n, e, side)
+@inner_kernel
+def best_beside(medium, front, state, source, node, e, side):
+    """The place between the ends of edge e and of the one beside it that offers least."""
+    stars, other = medium.stars, beside(medium.stars, node.n, e, side)
     if other < 0:
-        return Place(math.inf, 0.0)
+        return NOWHERE
     ka, kb = np.int64(stars.directions[e]), np.int64(stars.directions[other])
-    a, b = n + offset_of(medium, ka), n + offset_of(medium, kb)
-    if front.u[b] == math.inf or not is_clear(medium, n, ka, kb):
-        return Place(math.inf, 0.0)
-    g = segment_between(medium, source, n, ka, kb)
-    ca = cost_per_chord(medium, n, e, g.aa)
-    cb = cost_per_chord(medium, n, other, g.aa + 2.0 * g.ae + g.ee)
-    return least_on(g, ca, cb, state.tau[a], state.tau[b], front.u[a], front.u[b])
+    a, b = node.n + medium.steps[ka], node.n + medium.steps[kb]
+    if front.u[b] == math.inf or not is_clear(medium, node.n, ka, kb):
+        return NOWHERE
+    g = segment_between(medium, source, node, ka, kb)
+    ca = cost_per_chord(medium, e, math.sqrt(g.aa))
+    cb = cost_per_chord(medium, other, math.sqrt(g.aa + 2.0 * g.ae + g.ee))
+    t = place_of_least(g, ca, cb, state.tau[a], state.tau[b], front.u[a], front.u[b])
+    if t <= LEAST_T:
+        return NOWHERE
+    return Place(value_on(g, t, ca, cb, state.tau[a], state.tau[b]), kb, t)
 
 
-@kernel
-def value_by(medium, front, state, source, n, e):
-    """The value of node n by way of its edge e and of the segments beside that."""
-    stars = medium.stars
-    k = np.int64(stars.directions[e])
-    a, aa = n + offset_of(medium, k), 0.0
-    grid = medium.grid
-    aa = (EAST[k] * grid.dx) ** 2 + (NORTH[k] * grid.dy) ** 2
-    for layer in range(source.lift.shape[0]):
-        aa += (lifted_height(medium, layer, a) - lifted_height(medium, layer, n)) ** 2
-    best = front.u[a] + cost_per_chord(medium, n, e, aa) * math.sqrt(aa)
-    right = beside_edge(medium, front, state, source, n, e, -1)
-    left = beside_edge(medium, front, state, source, n, e, 1)
-    side = 1 if left.value < right.value else -1
-    place = left if side == 1 else right
+@inner_kernel
+def value_of(medium, front, state, source, node, e):
+    """The value of a node by its edge e, or by one of the segments beside that."""
+    best, k = front.trial[node.n], np.int64(medium.stars.directions[e])
+    right = best_beside(medium, front, state, source, node, e, -1)
+    left = best_beside(medium, front, state, source, node, e, 1)
+    place = left if left.value < right.value else right
     if place.value < best:
-        other = np.int64(stars.directions[beside(stars, n, e, side)])
-        best = min(best, value_through(medium, front, state, source, n, k, other, place.t))
+        value = value_through(medium, front, state, source, node, k, place.direction, place.t)
+        best = min(best, value)
     return best
 
 
@@ -322,22 +314,29 @@ def queue_up(front, state, n, value):
 
 
 @inner_kernel
-def lower(medium, front, state, source, n, value):
-    """Give a node its value."""
-    front.u[n] = value
-    # At the source itself tau has its limit, the cost there, from the beginning.
-    if nodes_from(medium, source, n) > AT_SOURCE:
-        state.tau[n] = value / chord_to_node(medium, source, n)
+def settle(medium, front, state, source, n):
+    """Give a node its value, where that is less than the one it has."""
+    node, value = node_of(medium, source, n), front.trial[n]
+    if state.best[n] != SEED:
+        entry = entry_of(medium.stars, n, state.best[n])
+        value = value_of(medium, front, state, source, node, entry)
+    if value < front.u[n]:
+        front.u[n] = value
+        # At the source itself tau has its limit, the cost there, from the beginning.
+        if math.hypot(node.x, node.y) > AT_SOURCE * medium.grid.dx:
+            state.tau[n] = value / chord_of(medium, source, node)
+    # From now on only what is less by a share is an offer.
+    front.trial[n] = front.u[n] * (1.0 - GAIN)
 
 
 @inner_kernel
-def offer(medium, front, state, source, n):
+def offer(medium, front, state, n):
     """Offer the value of a settled node along all its edges."""
-    stars = medium.stars
+    stars, u = medium.stars, front.u[n]
     for e in range(stars.first[n], stars.first[n + 1]):
         k = np.int64(stars.directions[e])
-        x, value = n + offset_of(medium, k), front.u[n] + np.float64(stars.costs[e])
-        if value < front.trial[x] and value < front.u[x] * (1.0 - GAIN):
+        x, value = n + medium.steps[k], u + np.float64(stars.costs[e])
+        if value < front.trial[x]:
             state.best[x] = (k + HALF) % (2 * HALF)
             queue_up(front, state, x, value)
 
@@ -362,11 +361,6 @@ def march(medium, front, state, source, most, limit):
         dequeue(state.links, front, n)
         front.counters[QUEUED] -= 1
         state.queued[n] = 0
-        value = front.trial[n]
-        if state.best[n] != SEED:
-            entry = entry_of(medium.stars, n, state.best[n])
-            value = value_by(medium, front, state, source, n, entry)
-        if value < front.u[n]:
-            lower(medium, front, state, source, n, value)
-        offer(medium, front, state, source, n)
+        settle(medium, front, state, source, n)
+        offer(medium, front, state, n)
     return most

@@ -6,7 +6,6 @@ has it, is wide, the direction between them in the Stern-Brocot tree joins them,
 that are less. An edge leads both ways and is in the stars of both nodes.
 """
 
-import math
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -185,7 +184,7 @@ def count_edges(ahead, back, first):
         first[n + 1] = first[n] + edges
 
 
-@kernel
+@inner_kernel
 def edge_cost(ground, i, j, k):
     """The cost of the edge along direction k from node (i, j), rounded up to 32 bits."""
     per = 2 * ground.pieces
@@ -250,8 +249,3 @@ def direction_between(a, b):
     if max(abs(x), abs(y)) > FARTHEST:
         return -1
     return NUMBERS[y + FARTHEST, x + FARTHEST]
-
-
-@inner_kernel
-def distance_in_nodes(k):
-    return math.hypot(EAST[k], NORTH[k])
