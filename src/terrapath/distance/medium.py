@@ -56,6 +56,7 @@ class Medium:
             np.stack([z[::per, ::per].ravel() for z in self.ground.heights], axis=-1),
             self.stars,
             self.steps,
+            (per * np.abs(star.DIRECTIONS).max(axis=1) <= self.ground.reach).astype(np.uint8),
             free_space.data,
             lattice.data,
             free_space.has_obstacles,

@@ -127,6 +127,12 @@ def bent(lift, excess):
     return sqrt(lift.vv) * (1.0 + excess * left_by_bending(lift))
 
 
+@inner_kernel
+def costed(ground, lift, length, c):
+    """The cost of a piece of a length."""
+    return max(length * mean_cost(lift, c), ground.floor * sqrt(lift.vv))
+
+
 # Pieces between samples
 
 
@@ -157,7 +163,7 @@ def sampled_piece(ground, i, j, ex, ey):
         return length
     c = ground.costs[0]
     costs = Costs(c[j, i], c[j1, i1], c[j2, i2], 0.5 * (c[jr, ir] - c[jl, il]))
-    return max(length * mean_cost(lift, costs), ground.floor * sqrt(lift.vv))
+    return costed(ground, lift, length, costs)
 
 
 class Place(NamedTuple):
@@ -253,7 +259,7 @@ def piece(ground, x0, y0, x2, y2):
         max(read(ground.costs, 0, p2), ground.floor),
         slope_along(ground.costs, 0, p1, -dy, dx),
     )
-    return max(length * mean_cost(lift, costs), ground.floor * sqrt(lift.vv))
+    return costed(ground, lift, length, costs)
 
 
 @kernel

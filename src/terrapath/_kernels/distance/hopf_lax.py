@@ -18,7 +18,7 @@ import numpy as np
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
 from .calendar_queue import QUEUED, dequeue, enqueue, least
-from .ground import place_at, ray, read
+from .ground import Costs, bent, costed, exceeds_chord, flat, place_at, plus_rise, ray, read
 from .star import EAST, HALF, NORTH, beside, direction_between, entry_of
 
 
@@ -37,6 +37,7 @@ class Medium(NamedTuple):
     heights: np.ndarray  # (n, layers) float64: weighted, of the nodes
     stars: object  # Stars
     steps: np.ndarray  # (64,) int64: each direction as a difference of node numbers
+    one_piece: np.ndarray  # (64,) uint8: is an edge along it a single piece?
     space: object  # Space
     grid: object  # Grid, of the nodes
     has_obstacles: bool
@@ -246,25 +247,80 @@ def bend_of(medium, front, state, node, ka, kb):
     return before if abs(before) < abs(after) else after
 
 
+class Arrival(NamedTuple):
+    """A way to a node: what it costs, and the chord from the source to where it begins."""
+
+    cost: float
+    chord: float
+
+
 @inner_kernel
-def value_through(medium, front, state, source, node, ka, kb, t):
-    """The value of a node through the place t between two of its neighbours."""
+def along_ray(medium, source, node, x, y):
+    """The way from the place (x, y) from a node, in nodes, piece by piece."""
     ground, per = medium.ground, 2.0 * medium.ground.pieces
-    a, b = node.n + medium.steps[ka], node.n + medium.steps[kb]
-    dx, dy = EAST[ka] + t * (EAST[kb] - EAST[ka]), NORTH[ka] + t * (NORTH[kb] - NORTH[ka])
-    cost = ray(ground, per * node.i, per * node.j, per * dx, per * dy)
-    x, y = node.x + dx * medium.grid.dx, node.y + dy * medium.grid.dy
-    place = place_at(ground, per * (node.i + dx), per * (node.j + dy))
-    squared = x * x + y * y
+    cost = ray(ground, per * node.i, per * node.j, per * x, per * y)
+    dx, dy = node.x + x * medium.grid.dx, node.y + y * medium.grid.dy
+    place = place_at(ground, per * (node.i + x), per * (node.j + y))
+    squared = dx * dx + dy * dy
     for layer in range(source.lift.shape[0]):
         rise = read(ground.heights, layer, place) - source.lift[layer]
         squared += rise * rise
-    chord = math.sqrt(squared)
+    return Arrival(cost, math.sqrt(squared))
+
+
+@inner_kernel
+def in_triangle(medium, source, node, ka, kb, t):
+    """The way from t between two neighbours, in one piece.
+
+    Heights are the quadratic through the corners of the triangle and the middles of its sides.
+    """
+    ground, grid, z = medium.ground, medium.grid, medium.heights
+    half, n = ground.pieces, node.n
+    a, b, i, j = n + medium.steps[ka], n + medium.steps[kb], 2 * half * node.i, 2 * half * node.j
+    ai, aj, bi, bj = half * EAST[ka], half * NORTH[ka], half * EAST[kb], half * NORTH[kb]
+    x, y = EAST[ka] + t * (EAST[kb] - EAST[ka]), NORTH[ka] + t * (NORTH[kb] - NORTH[ka])
+    vx, vy = x * grid.dx, y * grid.dy
+    ex, ey = (EAST[kb] - EAST[ka]) * grid.dx, (NORTH[kb] - NORTH[ka]) * grid.dy
+    lift = flat(vx, vy, ex, ey)
+    sx, sy = node.x + vx, node.y + vy
+    squared = sx * sx + sy * sy
+    for layer in range(source.lift.shape[0]):
+        samples, za, zb = ground.heights[layer], z[a, layer], z[b, layer]
+        ma, mb = samples[j + aj, i + ai], samples[j + bj, i + bi]
+        sag = samples[j + aj + bj, i + ai + bi] - 0.5 * (za + zb)
+        middle = ma + t * (mb - ma) + t * (1.0 - t) * sag
+        begin = za + t * (zb - za) + 4.0 * t * (1.0 - t) * sag
+        across = 2.0 * (mb - ma) + 2.0 * (1.0 - 2.0 * t) * sag
+        lift = plus_rise(lift, z[n, layer], middle, begin, across)
+        rise = begin - source.lift[layer]
+        squared += rise * rise
+    cost = bent(lift, exceeds_chord(lift))
+    if ground.costs.shape[0] > 0:
+        c = ground.costs[0]
+        ca, cb, cn = c[j + 2 * aj, i + 2 * ai], c[j + 2 * bj, i + 2 * bi], c[j, i]
+        ma, mb = c[j + aj, i + ai], c[j + bj, i + bi]
+        sag = c[j + aj + bj, i + ai + bi] - 0.5 * (ca + cb)
+        middle = max(ma + t * (mb - ma) + t * (1.0 - t) * sag, ground.floor)
+        begin = max(ca + t * (cb - ca) + 4.0 * t * (1.0 - t) * sag, ground.floor)
+        across = 2.0 * (mb - ma) + 2.0 * (1.0 - 2.0 * t) * sag
+        cost = costed(ground, lift, cost, Costs(cn, middle, begin, across))
+    return Arrival(cost, math.sqrt(squared))
+
+
+@inner_kernel
+def value_through(medium, front, state, source, node, ka, kb, t):
+    """The value of a node through the place t between two of its neighbours."""
+    a, b, ground = node.n + medium.steps[ka], node.n + medium.steps[kb], medium.ground
+    if medium.one_piece[ka] and medium.one_piece[kb]:
+        arrival = in_triangle(medium, source, node, ka, kb, t)
+    else:
+        x, y = EAST[ka] + t * (EAST[kb] - EAST[ka]), NORTH[ka] + t * (NORTH[kb] - NORTH[ka])
+        arrival = along_ray(medium, source, node, x, y)
     tau = state.tau[a] + t * (state.tau[b] - state.tau[a])
     bend = -0.5 * t * (1.0 - t) * bend_of(medium, front, state, node, ka, kb)
-    if abs(bend) * chord <= MOST_CORRECTED * cost:
+    if abs(bend) * arrival.chord <= MOST_CORRECTED * arrival.cost:
         tau += bend
-    return cost + chord * max(tau, ground.floor)
+    return arrival.cost + arrival.chord * max(tau, ground.floor)
 
 
 @inner_kernel
