@@ -7,10 +7,14 @@ import math
 import numpy as np
 import pytest
 import shapely
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 import terrapath as tp
-from common import FLAT, REGION, fitted_order
+from common import FLAT, REGION, fitted_order, points_in
 from planner_oracles import visibility_length
+from terrapath._kernels.distance import descent
+from terrapath.distance.medium import Medium
 from terrapath.problem import scenes
 
 PAPER = [name for name in scenes.names() if name != "jacksboro"]
@@ -200,9 +204,163 @@ def test_the_same_field_twice():
 # Rough ground
 
 
+def chords_to_nodes(field):
+    """(ny, nx), by a loop over nothing but the lifted points."""
+    lifted = field.surface.lift(field.lattice.points)
+    return np.linalg.norm(lifted - field.surface.lift(np.asarray(field.source)), axis=-1)
+
+
+def longest_edge_walk(field, count=8):
+    """(ny, nx): Dijkstra over the nodes around, each edge as long as in very short chords."""
+    points, surface = field.lattice.points, field.surface
+    ny, nx = points.shape[:2]
+    numbers = np.arange(ny * nx).reshape(ny, nx)
+    tails, heads, lengths = [], [], []
+    for rows, columns in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        first = np.s_[: ny - rows, max(-columns, 0) : nx - max(columns, 0)]
+        second = np.s_[rows:, max(columns, 0) : nx - max(-columns, 0)]
+        shares = np.linspace(0.0, 1.0, count + 1)[:, None, None, None]
+        way = points[first] + shares * (points[second] - points[first])
+        steps = np.linalg.norm(np.diff(surface.lift(way), axis=0), axis=-1)
+        cost = surface.cost(0.5 * (way[1:] + way[:-1])) if surface.costs else 1.0
+        tails.append(numbers[first].ravel())
+        heads.append(numbers[second].ravel())
+        lengths.append((steps * cost).sum(axis=0).ravel())
+    edges = (np.concatenate(lengths), (np.concatenate(tails), np.concatenate(heads)))
+    graph = csr_array(edges, shape=(ny * nx, ny * nx))
+    start = np.argmin(np.hypot(*np.moveaxis(points - field.source, -1, 0)))
+    return dijkstra(graph, directed=False, indices=start).reshape(ny, nx)
+
+
+AXIS = 5.0 + 10.0 * np.arange(60)
+
+
+def hills():
+    wave = np.sin(AXIS / 90.0)[None, :] * np.cos(AXIS / 70.0)[:, None]
+    return 0.3 * AXIS[None, :] + 20.0 * wave
+
+
+def with_pit(depth):
+    heights = hills()
+    heights[34:40, 30:36] = depth
+    return heights
+
+
+def fractal(seed, slope=1.8):
+    random, f = np.random.default_rng(seed), np.fft.fftfreq(64)
+    size = np.hypot(f[:, None], f[None])
+    size[0, 0] = 1.0
+    heights = np.fft.ifft2(np.fft.fft2(random.normal(size=(64, 64))) * size**-slope).real[:60, :60]
+    return 40.0 * (heights - heights.mean()) / heights.std()
+
+
+ROUGH = {
+    "hills": hills(),
+    "shallow pit": with_pit(0.0),
+    "pit": with_pit(-100.0),
+    "fractal": fractal(0),
+    "noise": 300.0 * np.random.default_rng(3).standard_normal((60, 60)),
+    "wall": np.where(np.arange(60) == 30, 500.0, 0.0)[None, :] + np.zeros((60, 1)),
+}
+
+
+@pytest.mark.parametrize("weight", [1.0, 10.0, 1000.0])
+@pytest.mark.parametrize("name", ROUGH)
+def test_a_field_is_between_the_chord_and_a_walk_over_its_nodes(name, weight):
+    surface = tp.Surface.from_grid(ROUGH[name], AXIS, AXIS, weights=[weight])
+    field = tp.distance_field(surface, (155.0, 305.0), spacing=10.0)
+    chords = chords_to_nodes(field)
+    assert np.isfinite(field.values).all()
+    assert (field.values >= chords * (1.0 - 1e-12)).all()
+    # The edges' own costs are those of paths that bend, and of few samples.
+    walk = longest_edge_walk(field)
+    assert np.median(field.values / np.maximum(walk, 1e-9)) <= 1.0
+    goals = points_in(surface.bounds, 20, seed=1)
+    for goal, value in zip(goals, field.at(goals), strict=True):
+        assert value >= (1.0 - 1e-9) * tp.chord(surface, [field.source], [goal])[0]
+        path = field.path_to(goal)
+        assert path is not None
+        assert path.length >= (1.0 - 1e-9) * tp.chord(surface, [field.source], [goal])[0]
+
+
+@pytest.mark.parametrize("slope", [0.1, 1.0, 10.0, 100.0, 1e4, 1e5])
+@pytest.mark.parametrize("direction", [(0.6, 0.8), (1.0, 0.0)])
+def test_planes_of_any_slope(slope, direction):
+    rise = slope * (direction[0] * AXIS[None, :] + direction[1] * AXIS[:, None])
+    surface = tp.Surface.from_grid(rise, AXIS, AXIS)
+    field = tp.distance_field(surface, (155.0, 305.0), spacing=10.0)
+    chords = chords_to_nodes(field)
+    assert (field.values >= chords * (1.0 - 1e-12)).all()
+    assert (field.values <= chords * 1.002 + 1e-9).all()
+    assert np.median(field.values[chords > 0.0] / chords[chords > 0.0]) <= 1.0 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "weight", "middle", "most"),
+    [("hills", 1.0, 1e-4, 1e-3), ("hills", 10.0, 1e-3, 0.02), ("fractal", 1.0, 0.01, 0.1)],
+)
+def test_values_at_the_maps_own_spacing(name, weight, middle, most):
+    """Against a lattice eight times finer: the errors that are documented."""
+    surface = tp.Surface.from_grid(ROUGH[name], AXIS, AXIS, weights=[weight])
+    coarse, fine = (tp.distance_field(surface, (155.0, 305.0), spacing=d) for d in (10.0, 1.25))
+    truth = fine.values[::8, ::8]
+    errors = np.abs(coarse.values[truth > 0.0] / truth[truth > 0.0] - 1.0)
+    assert np.median(errors) <= middle
+    assert errors.max() <= most
+
+
+def test_there_and_back_on_rough_ground():
+    surface = tp.Surface.from_grid(fractal(1), AXIS, AXIS)
+    ends = points_in(surface.bounds, 12, seed=2)
+    fields = [tp.distance_field(surface, end, spacing=10.0).at(ends) for end in ends]
+    there = np.array(fields)[~np.eye(12, dtype=bool)]
+    back = np.array(fields).T[~np.eye(12, dtype=bool)]
+    assert np.median(np.abs(there / back - 1.0)) <= 0.01
+
+
+def test_more_obstacles_are_never_shorter():
+    surface = tp.Surface.from_grid(fractal(2), AXIS, AXIS)
+    boxes = [shapely.box(x, y, x + 60.0, y + 40.0) for x, y in ((100, 100), (300, 250), (180, 400))]
+    without = tp.distance_field(surface, (55.0, 55.0), spacing=10.0)
+    within = tp.distance_field(surface, (55.0, 55.0), obstacles=boxes, spacing=10.0)
+    assert (within.values >= without.values * (1.0 - 1e-3)).all()
+
+
+def test_a_costly_field_is_at_least_the_least_cost_times_the_chord():
+    random = np.random.default_rng(5)
+    costs = np.where(random.random((60, 60)) < 0.4, 255.0, 1.0)
+    surface = tp.read_surface(
+        (hills(), AXIS, AXIS), costs={"going": (costs, AXIS, AXIS)}, smoothing=None
+    )
+    field = tp.distance_field(surface, (155.0, 305.0), spacing=10.0)
+    assert (field.values >= surface.least_cost * chords_to_nodes(field) * (1.0 - 1e-12)).all()
+    walk = longest_edge_walk(field)
+    assert np.median(field.values / np.maximum(walk, 1e-9)) <= 1.02
+
+
+def test_a_limit_leaves_out_what_is_farther():
+    problem = tp.scenes.load("one-peak")
+    medium = Medium(problem.surface, tp.Lattice.spanning(problem.bounds, 0.2), problem.free_space)
+    whole = medium.march(problem.start)[0]
+    part = medium.march(problem.start, limit=7.0)[0]
+    reached = np.isfinite(part)
+    assert (part[reached] == whole[reached]).all()
+    assert whole[~reached].min() > 6.3
+    assert part[reached].max() < 7.5
+
+
+def test_where_a_descent_leads_nowhere_a_path_follows_the_edges(monkeypatch):
+    monkeypatch.setattr(descent, "trace", lambda *arguments: 0)
+    wall = shapely.box(4.0, -1.0, 5.0, 9.0)
+    field = tp.distance_field(FLAT, (0.0, 0.0), bounds=REGION, obstacles=[wall], spacing=0.25)
+    path = field.path_to((8.0, 0.0))
+    assert path.line.disjoint(wall)
+    truth = visibility_length((0.0, 0.0), (8.0, 0.0), [wall], REGION)
+    assert truth <= path.length <= 1.09 * truth  # of edges to eight neighbours
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_on_steep_noise_distances_are_above_zero(seed):
-    # The source's model does not hold here, and once made nearly all of them negative.
     random = np.random.default_rng([7, seed])
     axis = 10.0 * np.arange(40)
     surface = tp.Surface.from_grid(300.0 * random.standard_normal((40, 40)), axis, axis)

@@ -31,10 +31,10 @@ STEP = 0.5
 class DistanceField:
     """Distances under h from one source, at the nodes of a lattice.
 
-    source : (x1, x2), map units. medium : the ground on the lattice. values : (ny, nx), map units, infinite where no path was found on the
-    lattice. ratios : (ny, nx), the values over the chord from the source without costs. problem :
-    from the source to itself, with the constraints that were asked for; None where the field was
-    not made from a problem.
+    source : (x1, x2), map units. medium : the ground on the lattice. values : (ny, nx), map units,
+    infinite where no path was found on the lattice. ratios : (ny, nx), the values over the chord
+    from the source without costs. problem : from the source to itself, with the constraints
+    that were asked for; None where the field was not made from a problem.
     """
 
     source: tuple[float, float]

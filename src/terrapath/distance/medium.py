@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,9 @@ from ..space.free_space import FreeSpace
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, PointLike
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
 BUCKET_SHARE = 4.0
@@ -122,25 +126,31 @@ class Medium:
 
         Raises LookupError where no edges lead from one to the other.
         """
-        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import dijkstra
 
-        stars, count = self.stars, self.lattice.nx * self.lattice.ny
-        ends = [self._seeds(end, reach) for end, reach in ((goal, REACH), (source, SEED_RADIUS))]
-        tails = np.repeat(np.arange(count), np.diff(stars.first))
-        # The two ends are two more nodes.
-        heads = [tails + self.steps[stars.directions], ends[0][0], np.full(len(ends[1][0]), count + 1)]
-        begins = [tails, np.full(len(ends[0][0]), count), ends[1][0]]
-        costs = np.concatenate([stars.costs, ends[0][1], ends[1][1]])
-        edges = (costs, (np.concatenate(begins), np.concatenate(heads)))
-        graph = csr_array(edges, shape=(count + 2, count + 2))
-        before = dijkstra(graph, indices=count, return_predecessors=True)[1]
+        count = self.lattice.nx * self.lattice.ny
+        before = dijkstra(self._graph(source, goal), indices=count, return_predecessors=True)[1]
         path = [before[count + 1]]
         while path[-1] != count:
             if path[-1] < 0:
                 raise LookupError("no edges lead from the goal to the source")
             path.append(before[path[-1]])
         return np.asarray(path[-2::-1], np.int64)
+
+    def _graph(self, source: tuple[float, float], goal: Array) -> csr_array:
+        """The costs of all edges; the last two nodes are the goal and the source."""
+        from scipy.sparse import csr_array
+
+        count = self.lattice.nx * self.lattice.ny
+        beside_goal, from_goal = self._seeds(goal, REACH)
+        beside_source, to_source = self._seeds(source, SEED_RADIUS)
+        tails = np.repeat(np.arange(count), np.diff(self.stars.first))
+        heads = tails + self.steps[self.stars.directions]
+        begins = [tails, np.full(len(beside_goal), count), beside_source]
+        ends = [heads, beside_goal, np.full(len(beside_source), count + 1)]
+        costs = np.concatenate([self.stars.costs, from_goal, to_source])
+        pairs = (np.concatenate(begins), np.concatenate(ends))
+        return csr_array((costs, pairs), shape=(count + 2, count + 2))
 
     def _front(self, values: Array) -> calendar_queue.Front:
         lattice, count = self.lattice, self.lattice.nx * self.lattice.ny

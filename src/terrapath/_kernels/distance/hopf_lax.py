@@ -5,9 +5,9 @@ neighbours in its star. Values are factored by the chord d from the source, u = 
 tau is linear and d exact. So no value is below the chord, planes are exact, and near the source
 nothing special is needed. Where tau bends, its second differences make the scheme second order.
 
-Nodes are queued by what their edges offer. A node that is settled looks at the segment beside its
-best edge, on the side that offers less (Mirebeau 2014: in stars without wide angles the places that matter are less).
-A node that is offered less later is queued again.
+Nodes are queued by what their edges offer. A node that is settled looks at the segments beside its
+best edge: in stars without wide angles the places that matter are less (Mirebeau 2014). A node that
+is offered less later is queued again.
 """
 
 import math
