@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from terrapath._support.memory import forget_peak, peak_memory
-from terrapath.distance.field import DistanceField, Medium, march_from
+from terrapath.distance.field import DistanceField, march_from
+from terrapath.distance.medium import Medium
 from terrapath.problem import Problem, scenes
 from terrapath.space.lattice import Lattice
 
@@ -20,16 +21,6 @@ from .timing import Reading, Timing, timed
 SMALL = 61
 
 
-class TimedMedium(Medium):
-    """A medium that keeps how long its dependents took."""
-
-    dependents_time: Reading
-
-    def _dependents(self) -> Any:
-        dependents, self.dependents_time = timed(super()._dependents)
-        return dependents
-
-
 class Bench:
     """One scene on one lattice."""
 
@@ -37,27 +28,22 @@ class Bench:
         self.problem = problem
         self.lattice = Lattice(problem.bounds, nodes, nodes)
 
-    def medium(self) -> TimedMedium:
-        """Stencils and dependents."""
-        made = TimedMedium.of_surface(self.problem.surface, self.lattice, self.problem.free_space)
-        assert isinstance(made, TimedMedium)
-        return made
+    def medium(self) -> Medium:
+        """The ground on the lattice, and all edges."""
+        return Medium(self.problem.surface, self.lattice, self.problem.free_space)
 
     def march(self, medium: Medium) -> DistanceField:
         """The distance field from the start."""
-        problem = self.problem
-        return march_from(problem.surface, problem.free_space, problem.start, medium)
+        return march_from(medium, self.problem.start)
 
     def distance(self) -> float:
         """The distance from start to goal, map units."""
         return float(self.march(self.medium()).at(self.problem.goal))
 
     def laps(self) -> list[Reading]:
-        """The times for stencils, for dependents and for the march."""
-        medium, made = timed(self.medium)
-        dependents = medium.dependents_time
-        stencils = Reading(made.wall - dependents.wall, made.processor - dependents.processor)
-        return [stencils, dependents, timed(lambda: self.march(medium))[1]]
+        """The times for the edges and for the march."""
+        medium, edges = timed(self.medium)
+        return [edges, timed(lambda: self.march(medium))[1]]
 
     def peer_lap(self, skfmm: Any) -> Reading:
         """The peer's time on the same lattice, on flat ground, all speeds 1, second order."""
@@ -85,9 +71,9 @@ def measure_marching(scene: str, runs: MarchRuns) -> Marched:
         laps.append(bench.laps())
         if skfmm is not None:
             peer_laps.append(bench.peer_lap(skfmm))
-    stencils, dependents, march = (Timing.of(readings) for readings in zip(*laps, strict=True))
+    edges, march = (Timing.of(readings) for readings in zip(*laps, strict=True))
     peer = Timing.of(peer_laps) if peer_laps else None
-    return Marched(stencils, dependents, march, peer, distance, before, peak)
+    return Marched(edges, march, peer, distance, before, peak)
 
 
 if __name__ == "__main__":

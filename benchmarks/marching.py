@@ -49,8 +49,7 @@ class MarchRuns:
 class Marched:
     """The measures of a fresh process."""
 
-    stencils: Timing
-    dependents: Timing
+    edges: Timing
     march: Timing
     peer: Timing | None  # scikit-fmm, isotropic, second order
     distance: float  # from start to goal, map units
@@ -60,7 +59,7 @@ class Marched:
     @property
     def whole(self) -> Timing:
         """The time from the surface to the distance field."""
-        return self.stencils + self.dependents + self.march
+        return self.edges + self.march
 
     @property
     def ratio(self) -> float | None:

@@ -81,7 +81,7 @@ def _marching_row(row: MarchRow) -> list[str]:
     return [
         row.scene,
         f"{row.nodes:,}",
-        *map(_seconds, (found.stencils, found.dependents, found.march, found.whole)),
+        *map(_seconds, (found.edges, found.march, found.whole)),
         NOTHING if found.peer is None else _seconds(found.peer),
         NOTHING if found.ratio is None else f"{found.ratio:.2f}",
         _signed(row.error),
@@ -99,12 +99,12 @@ def marching_lines(data: MarchData) -> list[str]:
             f"scikit-fmm {data.peer} solves the isotropic equation on the same lattice, all "
             "speeds 1, second order; it took turns with terrapath in one process."
         )
-    header = ["scene", "nodes a side", "stencils", "dependents", "march", "in all", "scikit-fmm"]
+    header = ["scene", "nodes a side", "edges", "march", "in all", "scikit-fmm"]
     header += ["ratio", "error at the goal", "error of HFM", "bytes a node", "GB in all"]
     return [
-        "The distance field of h from the start, second order, in seconds; dependents are the "
-        "lists of which nodes depend on which. Each lattice has a process of its own, warm. Memory "
-        "is the process's peak; for a node, it is how far the peak is above the peak before.",
+        "The distance field of h from the start, in seconds: choosing and measuring the edges, and "
+        "the march. Each lattice has a process of its own, warm. Memory is the process's peak; for "
+        "a node, it is how far the peak is above the peak before.",
         "",
         peer,
         "",

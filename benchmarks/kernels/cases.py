@@ -13,7 +13,8 @@ from terrapath import FastMarching, Lattice, Problem, RRTStar, Surface, refine
 from terrapath._kernels.surface.lengths import fill_chords, fill_line_r
 from terrapath._kernels.surface.surfaces import fill_jets, fill_metric, fill_values
 from terrapath.certificates.search import Search
-from terrapath.distance.field import Medium, field_of, march_from
+from terrapath.distance.field import field_of, march_from
+from terrapath.distance.medium import Medium
 from terrapath.geodesics.rays import trace_ray
 from terrapath.planners import Dijkstra
 from terrapath.problem import scenes
@@ -139,17 +140,19 @@ def lattice_of(side: int) -> Lattice:
     return Lattice.spanning(problem(peaks).bounds, SIDE / side)
 
 
-def make_stencils(ground: Callable[[], Surface], side: int) -> Work:
-    """Compute the rows of the metric, stencils and dependents."""
+def lay_edges(ground: Callable[[], Surface], side: int) -> Work:
+    """Sample the ground, and choose and measure the edges of all nodes."""
     lattice = lattice_of(side)
-    return Work(partial(Medium.of_surface, ground(), lattice), lattice.nx * lattice.ny)
+    surface = ground()
+    free = Problem(surface, START, START, lattice.bounds).free_space
+    return Work(partial(Medium, surface, lattice, free), lattice.nx * lattice.ny)
 
 
 def march(side: int) -> Work:
     """March among polygons."""
     lattice, of = lattice_of(side), problem(peaks, cluttered=True)
-    medium = Medium.of_surface(of.surface, lattice, of.free_space)
-    run = partial(march_from, of.surface, of.free_space, START, medium)
+    medium = Medium(of.surface, lattice, of.free_space)
+    run = partial(march_from, medium, START)
     return Work(run, lattice.nx * lattice.ny)
 
 
@@ -228,8 +231,8 @@ CASES = [
     Case("tree, open ground", "sample", partial(grow, peaks, {"informed": False}), 3_000, 50),
     Case("rays, peaks", "ray", partial(shoot, peaks), 12, 1),
     Case("rays, spline", "ray", partial(shoot, spline), 2, 1),
-    Case("stencils, peaks", "node", partial(make_stencils, peaks), 120, 12),
-    Case("stencils, spline", "node", partial(make_stencils, spline), 120, 12),
+    Case("edges, peaks", "node", partial(lay_edges, peaks), 120, 12),
+    Case("edges, spline", "node", partial(lay_edges, spline), 120, 12),
     Case("fast marching", "node", march, 120, 12),
     Case("field, look-up", "point", look_up, 3_000, 8),
     Case("field, descent", "point", descend, 120, 12),

@@ -77,7 +77,8 @@ class Medium:
         """
         lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
         place = (np.asarray(source) - lattice.bounds[:2]) / (lattice.dx, lattice.dy)
-        begin = hopf_lax.Source(*map(float, place), lift_of(self.surface, source))
+        lift = lift_of(self.surface, source)
+        begin = hopf_lax.Source(float(place[0]), float(place[1]), lift)
         state = hopf_lax.State(
             tau=np.full(count, math.inf),
             best=np.full(count, hopf_lax.SEED, np.uint8),

@@ -129,11 +129,11 @@ class Place(NamedTuple):
     """The value that is offered from t of the way to the end of a direction."""
 
     value: float
-    direction: int
+    direction: np.int64
     t: float
 
 
-NOWHERE = Place(math.inf, 0, 0.0)
+NOWHERE = Place(math.inf, np.int64(0), 0.0)
 
 
 @inner_kernel
