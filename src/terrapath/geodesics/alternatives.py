@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import shapely
 
-from ..distance.field import DistanceField, march_from
+from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
 from ..problem import Path, Problem
@@ -55,7 +55,7 @@ def alternatives(
         return (problem.path([problem.start, problem.goal]),)
     lattice = Lattice.spanning(problem.bounds, spacing or problem.default_spacing)
     medium = Medium(problem.surface, lattice, problem.free_space)
-    fields = [march_from(medium, end) for end in (problem.start, problem.goal)]
+    fields = march_both(medium, problem.start, problem.goal)
     failures: list[Exception] = []
     found = list(routes_of_fields(problem, fields[0], fields[1], count, failed=failures.append))
     if failures and not found:
@@ -92,7 +92,7 @@ def routes_of_fields(
         except Exception as error:
             failed(error)
         else:
-            if not any(_is_same(problem, route, other) for other in found):
+            if not any(is_same(problem, route, other) for other in found):
                 found.append(route)
                 yield route
         if tries >= TRIES * count or (must_stop is not None and must_stop()):
@@ -148,7 +148,8 @@ def _lead_through(
     return problem.path(np.concatenate([first.points[:-1], second.points[::-1]]))
 
 
-def _is_same(problem: Problem, a: Path, b: Path) -> bool:
+def is_same(problem: Problem, a: Path, b: Path) -> bool:
+    """Are two refined routes the same?"""
     side = problem.bounds.side
     if _stay_together(a, b, SAME_PLACE * side):
         return True

@@ -69,6 +69,13 @@ class Stopper:
         """Since the run began."""
         return time.perf_counter() - self.started
 
+    @property
+    def seconds_left(self) -> float | None:
+        """Before the time limit, above 0; None where there is none."""
+        if self.time_limit is None:
+            return None
+        return max(self.time_limit - self.seconds, 1e-9)
+
     def must_stop(self, progress: Progress) -> bool:
         """Show the progress to the callback and check the clock; once True, always True."""
         if self.callback is not None and self.callback(progress):

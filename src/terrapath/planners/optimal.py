@@ -1,18 +1,26 @@
-"""The best solution there is: candidates from fast marching, refined, with a certificate."""
+"""The best solution there is: candidates from many searches, refined, with a certificate."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
-from ..distance.field import DistanceField, march_from
+import numpy as np
+
+from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
-from ..geodesics.alternatives import routes_of_fields, shortest
+from ..geodesics.alternatives import is_same, routes_of_fields, shortest
+from ..geodesics.refinement import refine
 from ..problem import Path, Problem, Solution, Status
+from ..space.lattice import Lattice
+from ..surface.bounds import Bounds
 from ..validation import require_count, require_positive
 from .base import (
     INTERRUPT,
+    SEARCHING,
     Callback,
     Progress,
     Stopper,
@@ -22,17 +30,38 @@ from .base import (
     status_of,
 )
 from .finished import with_bound
+from .grid_search import AStar
+from .rrt_star import RRTStar
+
+# A field whose value at the goal is this near to the length of the best route, as a share, shows
+# every route that could be shorter. Elsewhere other searches follow, and finer fields.
+SURE = 1e-3
+
+# A finer field is solved where the best route may be this share longer than what a field says, at
+# least; and while that takes no more nodes than this.
+SLACK, MOST_NODES = 0.02, 2_000_000
+
+# A search that shortens the best route by no more than this share has found nothing.
+GAIN = 1e-6
+
+# The numbers of neighbours with which A* looks for routes.
+NEIGHBOURS = (32, 16, 8)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Optimal:
-    """Fast marching for the candidates, refinement for the digits, a certificate for proof.
+    """Many searches for candidates, refinement for the digits, a certificate for proof.
 
     target_gap : (length - lower bound) / lower bound to reach. routes : how many locally
     shortest routes to look for. The shortest is the path, the others are its alternatives.
-    spacing : of the nodes on which routes are searched, map units; by default a 250th of the
+    spacing : of the nodes on which routes are searched first, map units; by default a 250th of the
     region's longer side, or a cell of the map where that is less. time_limit : seconds, checked
     between the stages.
+
+    Candidates are the straight line and the routes of the distance fields from both ends. Where
+    the fields leave a doubt, on rough ground and among obstacles, A* with 32, 16 and 8 neighbours,
+    a tree, and fields on ever finer lattices follow. All are refined. The route from a start to a
+    goal is the same as back.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
     field; it is also the path returned where the run ends before a route was refined.
@@ -76,86 +105,184 @@ class _Run:
     """One run, and what it has found so far."""
 
     def __init__(self, planner: Optimal, problem: Problem, stopper: Stopper) -> None:
-        self.planner, self.problem = planner, problem
+        self.planner, self.given = planner, problem
         self.stopper = stopper
+        # One direction is solved, so that the other has the same answer.
+        self.is_reversed = problem.goal < problem.start
+        self.problem = problem
+        if self.is_reversed:
+            self.problem = problem.between_checked(problem.goal, problem.start)
         self.samples, self.total = 0, 0
         self.direct: Path | None = None
-        self.routes: tuple[Path, ...] = ()
+        self.found: list[Path] = []
+        self.failures: list[Exception] = []
+        self.trying = SEARCHING
+        self.is_sure = False
+
+    @property
+    def best(self) -> float:
+        """The length of the best path so far, map units."""
+        known = self.found if self.direct is None else [*self.found, self.direct]
+        return min((path.length for path in known), default=math.inf)
 
     def must_stop(self, settled: int = 0) -> bool:
-        best = self.direct.length if self.direct is not None else math.inf
-        progress = Progress(self.samples + settled, self.total, self.stopper.seconds, best)
+        progress = Progress(
+            self.samples + settled,
+            max(self.total, self.samples + settled),
+            self.stopper.seconds,
+            self.best,
+            stage=self.trying,
+        )
         return self.stopper.must_stop(progress)
 
     def solve(self) -> Solution:
         try:
-            self.find_routes()
+            for what, search in self.searches():
+                self.trying = what
+                search()
+                if self.is_sure or self.must_stop():
+                    break
         except KeyboardInterrupt:
             self.stopper.stopped_by = INTERRUPT
+        self.tell_failures()
         solution = self.answer()
         if solution.path is None or self.stopper.stopped_by:
             return solution
-        target = self.planner.target_gap
-        solution = with_bound(solution, target_gap=target, callback=self.stopper.must_stop)
-        if solution.status is Status.INTERRUPTED:
-            return solution
-        met = solution.gap is not None and solution.gap <= target
-        reason = "gap met" if met else self.stopper.stopped_by or "finest lattice"
-        return replace(solution, stopped_by=reason)
+        return self.proven(solution)
 
-    def find_routes(self) -> None:
-        """Find the locally shortest routes, on a finer lattice where a coarse one shows none."""
+    def searches(self) -> Iterator[tuple[str, Callable[[], None]]]:
+        """The searches in their order, with what the progress calls each."""
+        yield "trying the straight line", self.try_straight_line
+        yield "trying distance fields", self.try_fields
+        for neighbours in NEIGHBOURS:
+            what = f"trying A* with {neighbours} neighbours"
+            yield what, partial(self.try_planner, AStar(neighbours=neighbours))
+        yield "trying a tree", partial(self.try_planner, RRTStar())
+        yield "trying finer fields", self.try_finer_fields
+
+    # Searches
+
+    def try_straight_line(self) -> None:
         problem = self.problem
-        for lattice in lattices(problem, self.planner.spacing):
-            self.total = self.samples + 2 * lattice.nx * lattice.ny
-            medium = Medium(problem.surface, lattice, problem.free_space)
-            from_start = self.march(problem.start, medium)
-            self.direct = from_start.path_to(problem.goal)
-            self.routes = () if self.direct is None else (self.direct,)
-            if self.must_stop():
-                return
-            if self.direct is not None:
-                from_goal = self.march(problem.goal, medium)
-                if not self.must_stop():
-                    self.refine_routes(from_start, from_goal)
+        if problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
+            self.direct = problem.path([problem.start, problem.goal])
+            self.refine(self.direct)
+
+    def try_fields(self) -> None:
+        """The routes of distance fields, on a finer lattice where a coarse one shows none."""
+        for lattice in lattices(self.problem, self.planner.spacing):
+            if self.try_fields_on(lattice) or self.stopper.stopped_by:
                 return
 
-    def march(self, end: tuple[float, float], medium: Medium) -> DistanceField:
-        field = march_from(medium, end, watch=self.must_stop)
-        self.samples += round(field.reached * field.values.size)
-        return field
+    def try_fields_on(self, lattice: Lattice) -> bool:
+        """The routes of the distance fields on a lattice; False where they show none."""
+        problem = self.problem
+        self.total = self.samples + 2 * lattice.nx * lattice.ny
+        medium = Medium(problem.surface, lattice, problem.free_space)
+        self.fields = march_both(medium, problem.start, problem.goal, watch=self.must_stop)
+        self.samples += sum(round(f.reached * f.values.size) for f in self.fields)
+        if self.stopper.stopped_by and not math.isfinite(self.distance):
+            return False
+        path = self.fields[0].path_to(problem.goal)
+        if path is None:
+            return False
+        if path.length < self.best:
+            self.direct = path
+        if not self.must_stop():
+            self.refine_routes()
+        self.is_sure = abs(self.distance - self.best) <= SURE * self.best
+        return True
 
-    def refine_routes(self, from_start: DistanceField, from_goal: DistanceField) -> None:
-        """Refine the routes; each is kept as soon as it is done, whatever happens later."""
-        problem, count = self.problem, self.planner.routes
-        found: list[Path] = []
-        failures: list[Exception] = []
+    @property
+    def distance(self) -> float:
+        """What the fields say is the length, map units."""
+        return float(self.fields[0].at(self.problem.goal))
+
+    def try_planner(self, planner: AStar | RRTStar) -> None:
+        solution = planner.solve(self.problem, time_limit=self.stopper.seconds_left)
+        self.samples += solution.samples
+        if solution.path is not None:
+            self.refine(solution.path)
+
+    def try_finer_fields(self) -> None:
+        """Fields on ever finer lattices, where a shorter route could lead."""
+        lattice = self.fields[0].lattice
+        spacing = max(lattice.dx, lattice.dy)
+        while not self.must_stop():
+            spacing *= 0.5
+            lattice = Lattice.spanning(self.window(), spacing)
+            before = self.best
+            if lattice.nx * lattice.ny > MOST_NODES or not self.try_fields_on(lattice):
+                return
+            if self.is_sure and self.best >= before * (1.0 - GAIN):
+                return
+
+    def window(self) -> Bounds:
+        """The part of the bounds where a route could be shorter than the best, by the fields."""
+        lattice = self.fields[0].lattice
+        detours = self.fields[0].values + self.fields[1].values
+        slack = max(SLACK, 2.0 * abs(self.distance / self.best - 1.0))
+        rows, columns = np.nonzero(detours <= self.best * (1.0 + slack))
+        if not len(rows):
+            return self.problem.bounds
+        x, y = lattice.x, lattice.y
+        west, east = max(columns.min() - 2, 0), min(columns.max() + 2, lattice.nx - 1)
+        south, north = max(rows.min() - 2, 0), min(rows.max() + 2, lattice.ny - 1)
+        return Bounds(float(x[west]), float(y[south]), float(x[east]), float(y[north]))
+
+    # Routes
+
+    def refine(self, path: Path) -> None:
+        """Refine a candidate and keep it; where that fails, keep it as it is."""
+        try:
+            path = refine(self.problem, path)
+        except Exception as error:
+            self.failures.append(error)
+        self.keep(path)
+
+    def refine_routes(self) -> None:
+        """Refine the routes of the fields; each is kept as soon as it is done."""
         try:
             for route in routes_of_fields(
-                problem,
-                from_start,
-                from_goal,
-                count,
-                failed=failures.append,
+                self.problem,
+                *self.fields,
+                self.planner.routes,
+                failed=self.failures.append,
                 must_stop=self.must_stop,
             ):
-                if failures and not found:
-                    # The first route could not be refined, but it is a path all the same.
-                    found.extend(self.routes)
-                found.append(route)
-                self.routes = shortest(found, count)
+                self.keep(route)
         except Exception as error:
-            failures.append(error)
-        if failures:
+            self.failures.append(error)
+
+    def keep(self, route: Path) -> None:
+        """Keep a route unless it is one of those that are known."""
+        for k, other in enumerate(self.found):
+            if is_same(self.problem, route, other):
+                if route.length < other.length:
+                    self.found[k] = route
+                return
+        self.found.append(route)
+
+    # The answer
+
+    def tell_failures(self) -> None:
+        if self.failures:
             some = "not every route could be refined"
             none = "no route could be refined; the path is fast marching's"
-            tell_unfinished(some if found else none, failures[0])
+            tell_unfinished(some if self.found else none, self.failures[0])
+
+    def directed(self, path: Path) -> Path:
+        """A path, from the start that was given."""
+        return self.given.path(path.points[::-1].copy()) if self.is_reversed else path
 
     def answer(self) -> Solution:
         """What was found, without a lower bound."""
-        path = self.routes[0] if self.routes else None
+        known = self.found or ([] if self.direct is None else [self.direct])
+        routes = [self.directed(route) for route in shortest(known, self.planner.routes)]
+        path = routes[0] if routes else None
+        direct = None if self.direct is None or not self.found else self.directed(self.direct)
         return Solution(
-            problem=self.problem,
+            problem=self.given,
             planner=self.planner.name,
             status=status_of(path, self.stopper.stopped_by),
             path=path,
@@ -163,6 +290,21 @@ class _Run:
             seconds=self.stopper.seconds,
             samples=self.samples,
             stopped_by=self.stopper.stopped_by or "no path between the nodes",
-            unrefined=None if path is self.direct else self.direct,
-            alternatives=self.routes[1:],
+            unrefined=direct,
+            alternatives=tuple(routes[1:]),
         )
+
+    def proven(self, solution: Solution) -> Solution:
+        """The solution with the best lower bound that the time allows."""
+        target = self.planner.target_gap
+        solution = with_bound(
+            solution,
+            target_gap=target,
+            time_limit=self.stopper.seconds_left,
+            callback=self.stopper.must_stop,
+        )
+        if solution.status is Status.INTERRUPTED:
+            return solution
+        met = solution.gap is not None and solution.gap <= target
+        reason = "gap met" if met else self.stopper.stopped_by or "finest lattice"
+        return replace(solution, stopped_by=reason)
