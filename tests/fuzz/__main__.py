@@ -12,13 +12,14 @@ import os
 import sys
 import time
 from collections import Counter, defaultdict
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "helpers"))
 from fuzz_worker import Worker  # noqa: E402
-from trials import KINDS, PLANNERS  # noqa: E402
+from trials import KINDS, PLANNERS, compile_all, try_seed  # noqa: E402
 
 
 def arguments() -> argparse.Namespace:
@@ -69,15 +70,17 @@ class Tally:
 
 def main() -> int:
     asked = arguments()
-    worker = Worker(asked.planner, asked.extra, asked.limit)
-    tally = Tally()
+    work = partial(try_seed, planners=asked.planner, extra=asked.extra, limit=asked.limit)
+    # Building a path's value and the judges' own search have no limit of their own.
+    worker, tally = Worker(work, compile_all, 3.0 * asked.limit + 30.0), Tally()
     ends = time.monotonic() + 60.0 * asked.minutes
     number = 0
     try:
         while time.monotonic() < ends and number < asked.maps:
             kind = asked.kind[number % len(asked.kind)]
             seed = asked.seed + number // len(asked.kind)
-            words, faults, figures = worker.tried(kind, seed)
+            answer, failure = worker.tried((kind, seed))
+            words, faults, figures = answer or ("", [failure], {})
             tally.add(kind, seed, faults, figures)
             if asked.verbose:
                 print(f"{kind} {seed}: {words}", flush=True)

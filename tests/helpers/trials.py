@@ -59,14 +59,19 @@ class Fault(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A planner's answer, and its path's value by the judges; infinite without a path."""
+    """A planner's answer, and its path's value by the judges; infinite without a path.
+
+    is_free : does the path touch nothing? Others need not be as short as one that does.
+    """
 
     solution: Any
     value: float
+    is_free: bool = True
 
     @property
-    def timed_out(self) -> bool:
-        return "time" in self.solution.stopped_by
+    def cut(self) -> str:
+        """A note where the time limit ended the search."""
+        return ", cut short" if "time" in self.solution.stopped_by else ""
 
 
 @dataclass
@@ -142,35 +147,37 @@ def judge_solution(trial: Trial, scene: Scene, who: str, solution: Any) -> Answe
             trial.fault(missing, who, f"a path exists; {solution.stopped_by}")
         return Answer(solution, math.inf)
     trial.tell(f"judging {who}")
-    value = judge_path(trial, scene, who, solution.path.points)
+    value, is_free = judge_path(trial, scene, who, solution.path.points)
     believed = getattr(solution, "value", solution.length)
     if not math.isclose(believed, value, rel_tol=1e-6):
         trial.fault("value", who, f"says {believed:.10g}, quadrature {value:.10g}")
-    return Answer(solution, value)
+    return Answer(solution, value, is_free)
 
 
-def judge_path(trial: Trial, scene: Scene, who: str, points: np.ndarray) -> float:
-    """What holds of any path from the start to the goal; its value."""
+def judge_path(
+    trial: Trial, scene: Scene, who: str, points: np.ndarray
+) -> tuple[float, bool]:
+    """What holds of any path from the start to the goal; its value, and does it touch nothing?"""
     start, goal = scene.ends(who)
     if not (np.isfinite(points).all() and (points[0] == start).all() and (points[-1] == goal).all()):
         trial.fault("ends", who, f"from {points[0]} to {points[-1]}")
-        return math.inf
+        return math.inf, False
     x0, y0, x1, y1 = scene.problem.bounds
     if (points < (x0, y0)).any() or (points > (x1, y1)).any():
         trial.fault("outside", who, "the path leaves the bounds")
-        return math.inf
+        return math.inf, False
     if (depth := judges.touches(scene.walls, points)) is not None:
         trial.fault("touches", who, f"{depth:.3g} of its path within obstacles")
     value = judges.value_of(scene.ground, points)
     straight = float(judges.chord(scene.ground, start, goal)[0])
     if value < straight * (1.0 - SAME):
         trial.fault("below-chord", who, f"{value:.10g} < {straight:.10g}")
-    return value
+    return value, depth is None
 
 
 def compare(trial: Trial, answers: dict[str, Answer], others: dict[str, float]) -> None:
     """``optimal`` against all other paths. others : values of further paths, by their names."""
-    values = {who: answer.value for who, answer in answers.items()} | others
+    values = {who: answer.value for who, answer in answers.items() if answer.is_free} | others
     best = min(values, key=values.__getitem__, default=None)
     if best is None or not math.isfinite(values[best]):
         return
@@ -181,13 +188,13 @@ def compare(trial: Trial, answers: dict[str, Answer], others: dict[str, float]) 
         why = f"{values[best]:.10g} by {best}; stopped by {answer.solution.stopped_by!r}"
         # A run that found nothing is a fault already, and so is one whose route touches.
         if math.isfinite(answer.value) and answer.value > values[best] * (1.0 + BEATEN):
-            trial.fault("beaten", who, f"{answer.value / values[best] - 1:.2e}, {why}")
+            trial.fault(f"beaten{answer.cut}", who, f"{answer.value / values[best] - 1:.2e}, {why}")
         if bound is not None and bound > values[best] * (1.0 + SAME):
             trial.fault("bound", who, f"lower bound {bound:.10g} > {why}")
     there, back = (answers[who].value if who in answers else math.inf for who in ALWAYS[:2])
     if math.isfinite(there + back) and not math.isclose(there, back, rel_tol=SAME):
-        stops = [answers[who].solution.stopped_by for who in ALWAYS[:2]]
-        trial.fault("reversal", "optimal", f"{there:.10g}, back {back:.10g}; {stops}")
+        cut = answers["optimal"].cut or answers["reversed"].cut
+        trial.fault(f"reversal{cut}", "optimal", f"{there:.10g}, back {back:.10g}")
     if math.isfinite(there) and "rrt-star-r" in answers:
         trial.figure("rrt-star-r / optimal", answers["rrt-star-r"].value / there)
 
@@ -269,8 +276,9 @@ def judge_field_path(trial: Trial, scene: Scene, made: Any, place: np.ndarray) -
         return math.inf
     if (depth := judges.touches(scene.walls, points)) is not None:
         trial.fault("touches", f"{FIELD} path", f"to {place}: {depth:.3g} within obstacles")
+        return math.inf
     value = judges.value_of(scene.ground, points)
-    if at > 0.0:
+    if at is not None and at > 0.0:
         ratio = value / at
         trial.figure("field path / field", max(trial.figures.get("field path / field", 0), ratio))
     return value
@@ -365,7 +373,7 @@ def judge_exactness(trial: Trial, who: str, answer: Answer, exact: float) -> Non
     if who in {"optimal", "reversed"} and answer.value > exact * (1.0 + BEATEN):
         reason = answer.solution.stopped_by
         details = f"{answer.value / exact - 1:.2e} above {exact:.10g}; stopped by {reason!r}"
-        trial.fault("not-exact", who, details)
+        trial.fault(f"not-exact{answer.cut}", who, details)
     trial.figure(f"{who} / exact", answer.value / exact if exact > 0.0 else 1.0)
 
 
@@ -377,11 +385,17 @@ def try_seed(
     extra: int = 3,
     limit: float = 10.0,
     tell: Callable[[str], object] = lambda stage: None,
-) -> tuple[str, Trial]:
-    """The map of a kind and a seed in words, and what was found on it."""
+) -> tuple[str, list[Fault], dict[str, float]]:
+    """The map of a kind and a seed in words, its faults and its figures."""
     tell("making the map")
     made = KINDS[kind](seed)
     trial = Trial(limit, tell, may_refuse=kind == "pathological")
     judge = try_grid if kind == "grids" else try_map
     judge(made, trial, chosen(seed, planners, extra))
-    return str(made), trial
+    return str(made), trial.faults, trial.figures
+
+
+def compile_all() -> None:
+    """Run everything once, so that no planner's time is spent on compiling later."""
+    for kind, seed in (("rough", 1), ("rough", 3), ("grids", 1), ("grids", 5)):
+        try_seed(kind, seed, planners=[FIELD, *PLANNERS], limit=1.0)
