@@ -127,7 +127,7 @@ def pits(random, ny, nx):
     """Quarries and towers with sides of one cell in gentle ground."""
     heights = _gentle(random, ny, nx)
     for _ in range(random.integers(1, 6)):
-        j, i = random.integers(1, ny - 3), random.integers(1, nx - 3)
+        j, i = random.integers(ny - 1), random.integers(nx - 1)
         depth = random.choice([-1, -1, 1]) * random.uniform(1.0, 30.0)
         heights[j : j + random.integers(1, 9), i : i + random.integers(1, 9)] += depth
     return heights
@@ -228,7 +228,7 @@ def _some_mask(random, ny, nx):
         patches = fractal(random, ny, nx, 2.0)
         return patches > np.quantile(patches, random.uniform(0.6, 0.95))
     mask = np.zeros((ny, nx), bool)
-    mask[:, random.integers(2, nx - 2)] = True
+    mask[:, random.integers(1, nx - 1)] = True
     mask[random.integers(ny)] = False
     return mask
 
