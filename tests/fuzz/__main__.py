@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "helpers"))
-from fuzz_worker import Worker  # noqa: E402
-from trials import KINDS, PLANNERS, compile_all, try_seed  # noqa: E402
+from fuzz_worker import Worker
+from trials import KINDS, PLANNERS, compile_all, try_seed
 
 
 def arguments() -> argparse.Namespace:
@@ -37,6 +37,17 @@ def arguments() -> argparse.Namespace:
     asked = parser.parse_args()
     asked.kind = asked.kind or list(KINDS)
     return asked
+
+
+def lines_of(faults) -> list[str]:
+    """One for each planner and what is wrong with it."""
+    alike = defaultdict(list)
+    for what, who, details in faults:
+        alike[what, who].append(details)
+    return [
+        f"{what} of {who}: {first}" + (f"; {len(more)} more" if more else "")
+        for (what, who), (first, *more) in alike.items()
+    ]
 
 
 class Tally:
@@ -71,7 +82,7 @@ class Tally:
 def main() -> int:
     asked = arguments()
     work = partial(try_seed, planners=asked.planner, extra=asked.extra, limit=asked.limit)
-    # Building a path's value and the judges' own search have no limit of their own.
+    # A planner has its limit; a stage of the judges, and of the field, has no limit of its own.
     worker, tally = Worker(work, compile_all, 3.0 * asked.limit + 30.0), Tally()
     ends = time.monotonic() + 60.0 * asked.minutes
     number = 0
@@ -84,8 +95,8 @@ def main() -> int:
             tally.add(kind, seed, faults, figures)
             if asked.verbose:
                 print(f"{kind} {seed}: {words}", flush=True)
-            for what, who, details in faults:
-                print(f"FAULT {kind} {seed} {what} of {who}: {details}", flush=True)
+            for line in lines_of(faults):
+                print(f"FAULT {kind} {seed} {line}", flush=True)
             number += 1
     except KeyboardInterrupt:
         print("interrupted")

@@ -1,6 +1,7 @@
 """The judges of random maps, themselves judged: closed forms, brute force, and planted faults."""
 
 import math
+from itertools import pairwise
 from types import SimpleNamespace
 
 import networkx as nx
@@ -68,7 +69,7 @@ def test_a_rough_path_is_as_long_as_quadpack_says(seed):
 
     knots = sorted({(k - a[i]) / (b[i] - a[i]) for i in (0, 1) for k in AXIS})
     cuts = [0.0, *(t for t in knots if 0.0 < t < 1.0), 1.0]
-    truth = sum(quad(speed, *ends, epsrel=1e-11)[0] for ends in zip(cuts, cuts[1:], strict=False))
+    truth = sum(quad(speed, *ends, epsrel=1e-11)[0] for ends in pairwise(cuts))
     assert judges.value_of(ground, np.array([a, b])) == pytest.approx(truth, rel=1e-9)
 
 
@@ -77,7 +78,7 @@ def test_large_coordinates_cost_no_digits():
     here = judges.Ground(AXIS, AXIS, heights, 30.0)
     there = judges.Ground(5e5 + AXIS, 4.2e6 + AXIS, heights, 30.0)
     path = np.array(ENDS)
-    moved = path + (5e5, 4.2e6)
+    moved = path + np.array([5e5, 4.2e6])
     assert judges.value_of(there, moved) == pytest.approx(judges.value_of(here, path), rel=1e-8)
 
 
@@ -122,7 +123,7 @@ def test_distances_on_flat_ground_are_those_of_the_directions(neighbours, direct
     start, goal = (2.0, 3.0), (8.0, 5.5)
     found = judges.reach(FLAT, judges.united([]), start, goal, neighbours)
     dx, dy = 6.0, 2.5
-    for (ax, ay), (bx, by) in zip(directions, directions[1:], strict=False):
+    for (ax, ay), (bx, by) in pairwise(directions):
         area = ax * by - ay * bx
         along = (dx * by - dy * bx) / area, (ax * dy - ay * dx) / area
         if min(along) >= 0.0:

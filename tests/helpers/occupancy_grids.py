@@ -41,7 +41,8 @@ class OccupancyGrid:
     def problem(self) -> tp.Problem:
         ny, nx = self.blocked.shape
         # One cell more on each side, so that the ground reaches the outer edges.
-        x, y = (o + self.cell * (np.arange(-1, n + 1) + 0.5) for o, n in zip(self.origin, (nx, ny)))
+        ends = zip(self.origin, (nx, ny), strict=True)
+        x, y = (first + self.cell * (np.arange(-1, n + 1) + 0.5) for first, n in ends)
         ground = tp.Surface.from_grid(np.zeros((ny + 2, nx + 2)), x, y)
         obstacles = list(self.boxes) if self.as_polygons else [tp.Mask(self.blocked, *self.centres)]
         bounds = (*self.place((0, 0)), *self.place((nx, ny)))

@@ -39,6 +39,7 @@ PLANNERS: dict[str, tuple[str, dict[str, Any]]] = {
     "a-star 32": ("a-star", {"neighbours": 32}),
     "fast-marching": ("fast-marching", {}),
     "fast-marching refined": ("fast-marching", {"refine": True}),
+    "fast-marching bounded": ("fast-marching", {"refine": True, "bound": True}),
     "geodesic-traversal": ("geodesic-traversal", {}),
 }
 ALWAYS = ("optimal", "reversed", "rrt-star-r")
@@ -125,12 +126,16 @@ def plan(trial: Trial, problem: tp.Problem, who: str) -> Any:
 
 @dataclass(frozen=True)
 class Scene:
-    """What the judges know of a map. walls : closed parts. exists : does a path surely exist?"""
+    """What the judges know of a map.
+
+    walls : closed parts. exists : does a path surely exist? is_plane : one without costs.
+    """
 
     problem: tp.Problem
     ground: judges.Ground
     walls: list[shapely.Geometry]
     exists: bool
+    is_plane: bool = False
 
     def ends(self, who: str) -> tuple[np.ndarray, np.ndarray]:
         start, goal = np.array(self.problem.start), np.array(self.problem.goal)
@@ -174,21 +179,28 @@ def judge_path(trial: Trial, scene: Scene, who: str, points: np.ndarray) -> tupl
 
 
 def compare(trial: Trial, answers: dict[str, Answer], others: dict[str, float]) -> None:
-    """``optimal`` against all other paths. others : values of further paths, by their names."""
+    """All answers with one another. others : values of further paths, by their names."""
     values = {who: answer.value for who, answer in answers.items() if answer.is_free} | others
     best = min(values, key=values.__getitem__, default=None)
     if best is None or not math.isfinite(values[best]):
         return
+    for who, answer in answers.items():
+        bound = answer.solution.lower_bound
+        if bound is not None and bound > values[best] * (1.0 + SAME):
+            trial.fault("bound", who, f"{bound:.10g} > {values[best]:.10g} by {best}")
+    compare_optimal(trial, answers, best, values[best])
+
+
+def compare_optimal(trial: Trial, answers: dict[str, Answer], best: str, least: float) -> None:
+    """``optimal`` against the best path of all, and its own way back."""
     for who in ("optimal", "reversed"):
         if who not in answers:
             continue
-        answer, bound = answers[who], answers[who].solution.lower_bound
-        why = f"{values[best]:.10g} by {best}; stopped by {answer.solution.stopped_by!r}"
+        answer = answers[who]
+        why = f"{least:.10g} by {best}; stopped by {answer.solution.stopped_by!r}"
         # A run that found nothing is a fault already, and so is one whose route touches.
-        if math.isfinite(answer.value) and answer.value > values[best] * (1.0 + BEATEN):
-            trial.fault(f"beaten{answer.cut}", who, f"{answer.value / values[best] - 1:.2e}, {why}")
-        if bound is not None and bound > values[best] * (1.0 + SAME):
-            trial.fault("bound", who, f"lower bound {bound:.10g} > {why}")
+        if math.isfinite(answer.value) and answer.value > least * (1.0 + BEATEN):
+            trial.fault(f"beaten{answer.cut}", who, f"{answer.value / least - 1:.2e}, {why}")
     there, back = (answers[who].value if who in answers else math.inf for who in ALWAYS[:2])
     if math.isfinite(there + back) and not math.isclose(there, back, rel_tol=SAME):
         cut = answers["optimal"].cut or answers["reversed"].cut
@@ -253,6 +265,8 @@ def judge_values(trial: Trial, scene: Scene, made: Any) -> None:
     shares = values / np.maximum(straight, 1e-300)
     low = (shares < 0.999) & (straight > 1e-9 * straight.max())
     trial.figure("field / chord", shares[straight > 0.0].min())
+    if scene.is_plane and not scene.walls:
+        trial.figure("field / chord on an open plane", shares[straight > 0.0].max())
     if low.any():
         worst = int(np.argmin(np.where(low, shares, np.inf)))
         details = f"{low.mean():.2%} of nodes, {shares[worst]:.4f} of the chord at {nodes[worst]}"
@@ -318,7 +332,8 @@ def try_map(made: RoughMap, trial: Trial, planners: list[str]) -> None:
     walls, ground = made.walls(steep), made.own_ground(problem.surface)
     united = judges.united(walls)
     reached = judges.reach(ground, united, made.start, made.goal)
-    scene = Scene(problem, ground, walls, reached.found)
+    is_plane = made.ground == "plane" and made.cost is None
+    scene = Scene(problem, ground, walls, reached.found, is_plane)
     finer = judges.reach(ground, united, made.start, made.goal, 16)
     others = {"the straight line": straight_value(scene, united)}
     if finer.found:
@@ -327,11 +342,11 @@ def try_map(made: RoughMap, trial: Trial, planners: list[str]) -> None:
         others["the field's path"] = judge_field(trial, scene, reached, made.seed)
     answers = solve_all(trial, scene, planners)
     compare(trial, answers, others)
-    if made.ground == "plane" and made.cost is None:
-        judge_plane(trial, scene, answers, others["the straight line"])
+    if is_plane:
+        judge_plane(trial, answers, others["the straight line"])
 
 
-def judge_plane(trial: Trial, scene: Scene, answers: dict[str, Answer], straight: float) -> None:
+def judge_plane(trial: Trial, answers: dict[str, Answer], straight: float) -> None:
     """On a plane the straight line is the shortest path, where it is free."""
     if math.isinf(straight):
         return
