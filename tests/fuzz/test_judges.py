@@ -228,6 +228,7 @@ def solution_of(points, **more):
         "status": tp.Status.SOLVED,
         "stopped_by": "",
         "length": judges.value_of(FLAT, points),
+        "cost": judges.value_of(FLAT, points),
         "lower_bound": None,
     }
     return SimpleNamespace(**{**told, **more})
@@ -254,6 +255,7 @@ def test_a_right_answer_has_no_fault():
     ("found", "told", "points"),
     [
         ("value", {"length": 9.4}, STRAIGHT),
+        ("cost", {"cost": 9.4}, STRAIGHT),
         ("ends", {}, [(1, 2), (9, 6.999)]),
         ("outside", {}, [(1, 2), (5, 10.001), (9, 7)]),
         ("touches", {}, STRAIGHT),
@@ -286,6 +288,14 @@ def test_optimal_is_compared_with_all_others():
         "beaten, cut short",
         "beaten",
     ]
+
+
+def test_the_default_planner_is_not_beaten_by_the_straight_line():
+    for value, found in ((10.0, []), (10.1, [("beaten", "rrt-star-r")])):
+        trial = trials.Trial()
+        answers = {"rrt-star-r": trials.Answer(solution_of(STRAIGHT), value)}
+        trials.compare(trial, answers, {trials.STRAIGHT: 10.0})
+        assert [fault[:2] for fault in trial.faults] == found
 
 
 @pytest.mark.parametrize(

@@ -45,10 +45,13 @@ PLANNERS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 ALWAYS = ("optimal", "reversed", "rrt-star-r")
 MAY_FAIL = ("rrt", "geodesic-traversal")
-FIELD = "field"
+# Their cost is that of their edges, which is to be near the truth.
+BELIEVERS = ("rrt-star-r", "dijkstra 8", "dijkstra", "a-star 8", "a-star 32")
+FIELD, STRAIGHT = "field", "the straight line"
 
 FIELD_PATHS = 12  # places that a field's path is asked to
 BEATEN = 1e-6
+BELIEF = 1e-3
 SAME = 1e-9
 
 
@@ -154,8 +157,15 @@ def judge_solution(trial: Trial, scene: Scene, who: str, solution: Any) -> Answe
     trial.tell(f"judging {who}")
     value, is_free = judge_path(trial, scene, who, solution.path.points)
     believed = getattr(solution, "value", solution.length)
-    if math.isfinite(value) and not math.isclose(believed, value, rel_tol=1e-6):
+    if math.isinf(value):
+        return Answer(solution, value, False)
+    if not math.isclose(believed, value, rel_tol=1e-6):
         trial.fault("value", who, f"says {believed:.10g}, quadrature {value:.10g}")
+    if who in BELIEVERS and value > 0.0:
+        error = solution.cost / value - 1.0
+        trial.figure(f"error of the cost of {who}", error)
+        if abs(error) > BELIEF:
+            trial.fault("cost", who, f"believes {solution.cost:.6g}, quadrature {value:.6g}")
     return Answer(solution, value, is_free)
 
 
@@ -191,6 +201,9 @@ def compare(trial: Trial, answers: dict[str, Answer], others: dict[str, float]) 
         if bound is not None and bound > values[best] * (1.0 + SAME):
             trial.fault("bound", who, f"{bound:.10g} > {values[best]:.10g} by {best}")
     compare_optimal(trial, answers, best, values[best])
+    straight, default = others.get(STRAIGHT, math.inf), values.get("rrt-star-r", math.inf)
+    if straight * (1.0 + BEATEN) < default < math.inf:
+        trial.fault("beaten", "rrt-star-r", f"{default:.10g}, {STRAIGHT} {straight:.10g}")
 
 
 def compare_optimal(trial: Trial, answers: dict[str, Answer], best: str, least: float) -> None:
@@ -206,7 +219,7 @@ def compare_optimal(trial: Trial, answers: dict[str, Answer], best: str, least: 
     there, back = (answers[who].value if who in answers else math.inf for who in ALWAYS[:2])
     if math.isfinite(there + back) and not math.isclose(there, back, rel_tol=SAME):
         cut = answers["optimal"].cut or answers["reversed"].cut
-        trial.fault(f"reversal{cut}", "optimal", f"{there:.10g}, back {back:.10g}")
+        trial.fault(f"reversal{cut}", "optimal", f"{there:.10g}, back {back / there - 1:+.1e}")
     if math.isfinite(there) and "rrt-star-r" in answers:
         trial.figure("rrt-star-r / optimal", answers["rrt-star-r"].value / there)
 
@@ -337,7 +350,7 @@ def try_map(made: RoughMap, trial: Trial, planners: list[str]) -> None:
     is_plane = made.ground == "plane" and made.cost is None
     scene = Scene(problem, ground, walls, reached.found, is_plane)
     finer = judges.reach(ground, united, made.start, made.goal, 16)
-    others = {"the straight line": straight_value(scene, united)}
+    others = {STRAIGHT: straight_value(scene, united)}
     if finer.found:
         others["the judges' graph"] = judges.value_of(ground, finer.path())
     if FIELD in planners:
@@ -345,7 +358,7 @@ def try_map(made: RoughMap, trial: Trial, planners: list[str]) -> None:
     answers = solve_all(trial, scene, planners)
     compare(trial, answers, others)
     if is_plane:
-        judge_plane(trial, answers, others["the straight line"])
+        judge_plane(trial, answers, others[STRAIGHT])
 
 
 def judge_plane(trial: Trial, answers: dict[str, Answer], straight: float) -> None:
