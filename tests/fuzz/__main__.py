@@ -64,7 +64,8 @@ class Tally:
             if seed not in self.seeds[kind, what, who]:
                 self.seeds[kind, what, who].append(seed)
         for name, value in figures.items():
-            self.figures[kind, name].append(value)
+            if np.isfinite(value):
+                self.figures[kind, name].append(value)
 
     def report(self) -> None:
         for kind, count in self.maps.items():
