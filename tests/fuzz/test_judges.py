@@ -1,5 +1,6 @@
 """The judges of random maps, themselves judged: closed forms, brute force, and planted faults."""
 
+import json
 import math
 from itertools import pairwise
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from scipy.integrate import quad
 import judges
 import terrapath as tp
 import trials
+from common import REAL_MAPS
 from fuzz_worker import Worker
 from misbehaving import prepare, work
 from occupancy_grids import GRIDS, random_grid
@@ -211,6 +213,18 @@ def test_the_exact_length_is_that_of_all_pairs_of_corners(seed):
     except nx.NetworkXNoPath:
         truth = math.inf
     assert judges.exact_length(blocked, start, goal) == pytest.approx(truth, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_the_exact_length_is_that_of_an_integer_visibility_graph():
+    if not (REAL_MAPS / "random-100-33.map").exists():
+        pytest.skip("the grid is not beside this clone")
+    rows = (REAL_MAPS / "random-100-33.map").read_text(encoding="utf-8").split("map\n")[1].split()
+    blocked = np.array([[letter != "." for letter in row] for row in rows])
+    case = json.loads((REAL_MAPS / "random-100-33.exact.json").read_text(encoding="utf-8"))[0]
+    # There places are counted from the centre of the first cell.
+    ends = np.array([case["s"], case["t"]]) + 0.5
+    assert judges.exact_length(blocked, *ends) == pytest.approx(case["exact"], rel=1e-12)
 
 
 # What planners are judged by, with faults that are planted

@@ -281,7 +281,8 @@ def judge_values(trial: Trial, scene: Scene, made: Any) -> None:
     low = (shares < 0.999) & (straight > 1e-9 * straight.max())
     trial.figure("field / chord", shares[straight > 0.0].min())
     if scene.is_plane and not scene.walls:
-        trial.figure("field / chord on an open plane", shares[straight > 0.0].max())
+        # Near the source, along a level line, the chord is shorter than the scheme can tell.
+        trial.figure("field / chord on an open plane, 95 %", np.quantile(shares, 0.95))
     if low.any():
         worst = int(np.argmin(np.where(low, shares, np.inf)))
         details = f"{low.mean():.2%} of nodes, {shares[worst]:.4f} of the chord at {nodes[worst]}"
@@ -366,7 +367,7 @@ def judge_plane(trial: Trial, answers: dict[str, Answer], straight: float) -> No
     if math.isinf(straight):
         return
     for who in ("optimal", "reversed"):
-        if who in answers and answers[who].value > straight * (1.0 + BEATEN):
+        if who in answers and straight * (1.0 + BEATEN) < answers[who].value < math.inf:
             trial.fault("not-exact", who, f"{answers[who].value:.10g}, straight {straight:.10g}")
 
 
