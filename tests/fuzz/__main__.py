@@ -19,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "helpers"))
 from fuzz_worker import Worker
-from trials import KINDS, PLANNERS, compile_all, try_seed
+from trials import FIELDS, KINDS, PLANNERS, compile_all, try_seed
 
 
 def arguments() -> argparse.Namespace:
@@ -29,7 +29,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of the first map; the next counts on")
     parser.add_argument("--kind", choices=list(KINDS), action="append")
     parser.add_argument(
-        "--planner", choices=["field", *PLANNERS], action="append", default=[], help="only these"
+        "--planner", choices=[*FIELDS, *PLANNERS], action="append", default=[], help="only these"
     )
     parser.add_argument("--extra", type=int, default=3, help="planners beside the main ones")
     parser.add_argument("--limit", type=float, default=10.0, help="seconds a planner may take")

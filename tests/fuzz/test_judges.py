@@ -378,9 +378,19 @@ def test_maps_are_of_all_kinds_and_their_ends_are_free():
     assert any(one.cost is not None for one in made)
     assert any(one.polygons for one in made)
     assert {random_grid(seed).kind for seed in range(4)} == set(GRIDS)
-    for one in (*made, *map(pathological_map, range(16))):
+    for one in made:
         assert shapely.disjoint(shapely.MultiPoint([one.start, one.goal]), one.walls()).all()
         one.problem()
+
+
+def test_pathological_maps_have_all_that_is_bad():
+    made = [pathological_map(seed) for seed in range(60)]
+    assert any(one.start == one.goal for one in made)
+    starts = [shapely.Point(one.start) for one in made]
+    touched = [shapely.intersects(p, one.polygons).any() for p, one in zip(starts, made, strict=1)]
+    assert any(touched)
+    assert max(one.weight for one in made) == 1e6
+    assert max(one.cell.max() / one.cell.min() for one in made) == 1e6
 
 
 # The worker

@@ -367,4 +367,15 @@ def pathological_map(seed: int) -> RoughMap:
     weight = float(10.0 ** random.integers(0, 7))
     if ground == "plane":
         weight = float(10.0 ** random.integers(0, 4))
-    return _map_of(random, seed, "pathological", ground, x, y, weight)
+    return _made_worse(random, _map_of(random, seed, "pathological", ground, x, y, weight))
+
+
+def _made_worse(random, made):
+    """Sometimes the goal is the start itself, or a polygon has a corner there."""
+    draw = random.random()
+    if draw < 0.05:
+        return replace(made, goal=made.start)
+    if draw < 0.1:
+        corners = np.array([(0.0, 0.0), (2.0, 1.0), (1.0, 2.0)]) * made.cell + made.start
+        return replace(made, polygons=(*made.polygons, shapely.Polygon(corners)))
+    return made

@@ -6,7 +6,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,6 +48,9 @@ MAY_FAIL = ("rrt", "geodesic-traversal")
 # Their cost is that of their edges, which is to be near the truth.
 BELIEVERS = ("rrt-star-r", "dijkstra 8", "dijkstra", "a-star 8", "a-star 32")
 FIELD, STRAIGHT = "field", "the straight line"
+# The field of the same map under a larger weight.
+STEEP_FIELD, STEEPER = "steep field", 10.0
+FIELDS = (FIELD, STEEP_FIELD)
 
 FIELD_PATHS = 12  # places that a field's path is asked to
 BEATEN = 1e-6
@@ -236,11 +239,11 @@ def straight_value(scene: Scene, united: shapely.Geometry) -> float:
 # The distance field
 
 
-def judge_field(trial: Trial, scene: Scene, reached: judges.Reach, seed: int) -> float:
+def judge_field(trial: Trial, scene: Scene, reached: judges.Reach, who: str = FIELD) -> float:
     """The field from the start; returns the value of its path to the goal."""
     problem = scene.problem
     made = trial.attempt(
-        FIELD,
+        who,
         lambda: tp.distance_field(
             problem.surface,
             problem.start,
@@ -251,64 +254,67 @@ def judge_field(trial: Trial, scene: Scene, reached: judges.Reach, seed: int) ->
     )
     if made is None:
         return math.inf
-    judge_values(trial, scene, made)
+    judge_values(trial, scene, made, who)
     known = np.flatnonzero(np.isfinite(reached.distances))
-    at = trial.attempt(FIELD, lambda: made.at(reached.points[known]))
+    at = trial.attempt(who, lambda: made.at(reached.points[known]))
     if at is None:
         return math.inf
     missing = ~np.isfinite(at)
     if missing.any():
         worst = reached.points[known[missing]][0]
-        trial.fault("field-infinite", FIELD, f"{missing.sum()} of {len(at)} places, as {worst}")
+        trial.fault("field-infinite", who, f"{missing.sum()} of {len(at)} places, as {worst}")
     far = np.isfinite(at) & (reached.distances[known] > 0.0)
     if far.any():
-        trial.figure("field / graph", (at[far] / reached.distances[known][far]).max())
-    picked = np.random.default_rng(seed).choice(known, min(FIELD_PATHS, len(known)), replace=False)
+        trial.figure(f"{who} / graph", (at[far] / reached.distances[known][far]).max())
+    picked = np.random.default_rng(0).choice(known, min(FIELD_PATHS, len(known)), replace=False)
     for place in reached.points[picked]:
-        judge_field_path(trial, scene, made, place)
-    return judge_field_path(trial, scene, made, np.array(problem.goal))
+        judge_field_path(trial, scene, made, place, who)
+    return judge_field_path(trial, scene, made, np.array(problem.goal), who)
 
 
-def judge_values(trial: Trial, scene: Scene, made: Any) -> None:
+def judge_values(trial: Trial, scene: Scene, made: Any, who: str = FIELD) -> None:
     """Values of the field at its own nodes: not negative, not below the chord."""
     nodes = made.lattice.points.reshape(-1, 2)
     values = made.values.ravel()
     if np.isnan(values).any() or (values < 0.0).any():
-        trial.fault("field-negative", FIELD, f"{(~(values >= 0.0)).sum()} nodes, {values.min():g}")
+        trial.fault("field-negative", who, f"{(~(values >= 0.0)).sum()} nodes, {values.min():g}")
     start = np.broadcast_to(scene.problem.start, nodes.shape)
     straight = judges.chord(scene.ground, start, nodes)
     shares = values / np.maximum(straight, 1e-300)
     low = (shares < 0.999) & (straight > 1e-9 * straight.max())
-    trial.figure("field / chord", shares[straight > 0.0].min())
+    trial.figure(f"{who} / chord", shares[straight > 0.0].min())
     if scene.is_plane and not scene.walls:
         # Near the source, along a level line, the chord is shorter than the scheme can tell.
-        trial.figure("field / chord on an open plane, 95 %", np.quantile(shares, 0.95))
+        trial.figure(f"{who} / chord on an open plane, 95 %", np.quantile(shares, 0.95))
     if low.any():
         worst = int(np.argmin(np.where(low, shares, np.inf)))
         details = f"{low.mean():.2%} of nodes, {shares[worst]:.4f} of the chord at {nodes[worst]}"
-        trial.fault("field-below-chord", FIELD, details)
+        trial.fault("field-below-chord", who, details)
 
 
-def judge_field_path(trial: Trial, scene: Scene, made: Any, place: np.ndarray) -> float:
+def judge_field_path(
+    trial: Trial, scene: Scene, made: Any, place: np.ndarray, who: str = FIELD
+) -> float:
     """The field's path to a place: there where the field is finite, and as long as it says."""
-    at = trial.attempt(FIELD, lambda: float(made.at(place[None])[0]))
-    path = trial.attempt(f"{FIELD} path", lambda: made.path_to(place))
+    at = trial.attempt(who, lambda: float(made.at(place[None])[0]))
+    path = trial.attempt(f"{who} path", lambda: made.path_to(place))
     if path is None:
         if at is not None and math.isfinite(at):
-            trial.fault("field-path", FIELD, f"no path to {place}, though the field says {at:.6g}")
+            trial.fault("field-path", who, f"no path to {place}, though the field says {at:.6g}")
         return math.inf
     points = path.points
     ends = np.array([points[0], points[-1]])
     if not np.array_equal(ends, [scene.problem.start, place]):
-        trial.fault("ends", f"{FIELD} path", f"from {points[0]} to {points[-1]}, asked {place}")
+        trial.fault("ends", f"{who} path", f"from {points[0]} to {points[-1]}, asked {place}")
         return math.inf
     if (depth := judges.touches(scene.walls, points)) is not None:
-        trial.fault("touches", f"{FIELD} path", f"to {place}: {depth:.3g} within obstacles")
+        trial.fault("touches", f"{who} path", f"to {place}: {depth:.3g} within obstacles")
         return math.inf
     value = judges.value_of(scene.ground, points)
     if at is not None and at > 0.0:
         ratio = value / at
-        trial.figure("field path / field", max(trial.figures.get("field path / field", 0), ratio))
+        name = f"{who} path / {who}"
+        trial.figure(name, max(trial.figures.get(name, 0.0), ratio))
     return value
 
 
@@ -318,19 +324,20 @@ def judge_field_path(trial: Trial, scene: Scene, made: Any, place: np.ndarray) -
 def chosen(seed: int, asked: Iterable[str], extra: int) -> list[str]:
     """The planners of a trial: those asked for, or the main ones and a few others in turn."""
     if asked := list(asked):
-        return [who for who in (FIELD, *PLANNERS) if who in asked]
+        return [who for who in (*FIELDS, *PLANNERS) if who in asked]
     others = [who for who in PLANNERS if who not in ALWAYS]
     # Geodesic traversal is slow, and may fail.
     shares = np.array([0.3 if who in MAY_FAIL else 1.0 for who in others])
     random = np.random.default_rng([14, 3, seed])
     picked = random.choice(others, extra, replace=False, p=shares / shares.sum())
-    return [FIELD, *ALWAYS, *picked]
+    fields = FIELDS if seed % 4 == 0 else FIELDS[:1]
+    return [*fields, *ALWAYS, *picked]
 
 
 def solve_all(trial: Trial, scene: Scene, planners: list[str]) -> dict[str, Answer]:
     answers = {}
     for who in planners:
-        if who == FIELD:
+        if who in FIELDS:
             continue
         start, goal = (tuple(end) for end in scene.ends(who))
         solution = plan(trial, scene.problem.between(start, goal), who)
@@ -339,26 +346,33 @@ def solve_all(trial: Trial, scene: Scene, planners: list[str]) -> dict[str, Answ
     return answers
 
 
+def scene_of(made: RoughMap, problem: tp.Problem) -> tuple[Scene, judges.Reach, shapely.Geometry]:
+    """A map as the judges see it, what their own search reaches, and all walls as one."""
+    walls, ground = made.walls(problem.constraints.steep), made.own_ground(problem.surface)
+    united = judges.united(walls)
+    reached = judges.reach(ground, united, made.start, made.goal)
+    is_plane = made.ground == "plane" and made.cost is None
+    return Scene(problem, ground, walls, reached.found, is_plane), reached, united
+
+
 def try_map(made: RoughMap, trial: Trial, planners: list[str]) -> None:
     problem = trial.attempt("problem", made.problem)
     if problem is None:
         return
     trial.tell("the judges' own search")
-    steep = problem.constraints.steep
-    walls, ground = made.walls(steep), made.own_ground(problem.surface)
-    united = judges.united(walls)
-    reached = judges.reach(ground, united, made.start, made.goal)
-    is_plane = made.ground == "plane" and made.cost is None
-    scene = Scene(problem, ground, walls, reached.found, is_plane)
-    finer = judges.reach(ground, united, made.start, made.goal, 16)
+    scene, reached, united = scene_of(made, problem)
+    finer = judges.reach(scene.ground, united, made.start, made.goal, 16)
     others = {STRAIGHT: straight_value(scene, united)}
     if finer.found:
-        others["the judges' graph"] = judges.value_of(ground, finer.path())
+        others["the judges' graph"] = judges.value_of(scene.ground, finer.path())
     if FIELD in planners:
-        others["the field's path"] = judge_field(trial, scene, reached, made.seed)
+        others["the field's path"] = judge_field(trial, scene, reached)
+    if STEEP_FIELD in planners:
+        steeper = replace(made, weight=STEEPER * made.weight)
+        judge_field(trial, *scene_of(steeper, steeper.problem())[:2], STEEP_FIELD)
     answers = solve_all(trial, scene, planners)
     compare(trial, answers, others)
-    if is_plane:
+    if scene.is_plane:
         judge_plane(trial, answers, others[STRAIGHT])
 
 
@@ -427,4 +441,4 @@ def try_seed(
 def compile_all() -> None:
     """Run everything once, so that no planner's time is spent on compiling later."""
     for kind, seed in (("rough", 1), ("rough", 3), ("grids", 1), ("grids", 5)):
-        try_seed(kind, seed, planners=[FIELD, *PLANNERS], limit=1.0)
+        try_seed(kind, seed, planners=[*FIELDS, *PLANNERS], limit=1.0)
