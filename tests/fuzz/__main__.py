@@ -84,7 +84,7 @@ def main() -> int:
     asked = arguments()
     work = partial(try_seed, planners=asked.planner, extra=asked.extra, limit=asked.limit)
     # A planner has its limit; a stage of the judges, and of the field, has no limit of its own.
-    worker, tally = Worker(work, compile_all, 3.0 * asked.limit + 30.0), Tally()
+    worker, tally = Worker(work, compile_all, 6.0 * asked.limit + 60.0), Tally()
     ends = time.monotonic() + 60.0 * asked.minutes
     number = 0
     try:
