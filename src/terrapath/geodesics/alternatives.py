@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -76,19 +77,23 @@ def routes_of_fields(
     from_goal: DistanceField,
     count: int,
     *,
+    margin: float = math.inf,
     failed: Callable[[Exception], object],
     must_stop: Callable[[], bool] | None = None,
 ) -> Iterator[Path]:
     """Distinct routes, each as soon as it is refined; the path down the fields comes first.
 
     from_start, from_goal : distance fields on one lattice. count : routes that are asked for; more
-    are tried, because a later one may be shorter. failed : is called with the error where a
+    are tried, because a later one may be shorter. margin : but none that the fields say are longer
+    than the first by more than this share. failed : is called with the error where a
     route cannot be refined. must_stop : is asked after each candidate whether to end the search.
     """
     found: list[Path] = []
     for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
+        if len(found) >= count and candidate.excess > margin:
+            break
         try:
-            route = refine(problem, candidate)
+            route = refine(problem, candidate.path)
         except Exception as error:
             failed(error)
         else:
@@ -99,34 +104,42 @@ def routes_of_fields(
             break
 
 
+class _Candidate(NamedTuple):
+    """A path down two fields, and how much longer than the first they say it is, as a share."""
+
+    path: Path
+    excess: float
+
+
 def _candidates(
     problem: Problem, from_start: DistanceField, from_goal: DistanceField
-) -> Iterator[Path]:
+) -> Iterator[_Candidate]:
     """Routes through the nodes of least detour, each away from all routes before it."""
     direct = from_start.path_to(problem.goal)
     if direct is None:
         return
-    yield direct
+    yield _Candidate(direct, 0.0)
     lattice = from_start.lattice
     radius = NEIGHBOURHOOD * problem.bounds.side
-    points = _via_points(from_start.values + from_goal.values, lattice, radius)
-    points = _away_from(direct, points, radius)
-    while len(points):
-        path = _lead_through(problem, from_start, from_goal, points[0])
-        points = points[1:]
+    detours = from_start.values + from_goal.values
+    vias = _away_from(direct, _vias(detours, lattice, radius), radius)
+    while len(vias):
+        path = _lead_through(problem, from_start, from_goal, vias[0, :2])
+        excess = vias[0, 2] / float(detours.min()) - 1.0
+        vias = vias[1:]
         if path is not None:
-            points = _away_from(path, points, radius)
-            yield path
+            vias = _away_from(path, vias, radius)
+            yield _Candidate(path, excess)
 
 
-def _away_from(path: Path, points: Array, radius: float) -> Array:
-    """The points (m, 2) that are farther than a radius from a path."""
-    near = np.asarray(shapely.dwithin(path.line, shapely.points(points), radius))
-    return np.asarray(points[~near])
+def _away_from(path: Path, vias: Array, radius: float) -> Array:
+    """The places (m, 3) that are farther than a radius from a path."""
+    near = np.asarray(shapely.dwithin(path.line, shapely.points(vias[:, :2]), radius))
+    return np.asarray(vias[~near])
 
 
-def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:
-    """Nodes (m, 2) where the detour is least in a neighbourhood, by rising detour."""
+def _vias(detours: Array, lattice: Lattice, radius: float) -> Array:
+    """Nodes where the detour is least in a neighbourhood: (m, 3), x1, x2 and rising detours."""
     from scipy.ndimage import minimum_filter
 
     size = (2 * math.ceil(radius / lattice.dy) + 1, 2 * math.ceil(radius / lattice.dx) + 1)
@@ -135,7 +148,7 @@ def _via_points(detours: Array, lattice: Lattice, radius: float) -> Array:
     chosen = np.isfinite(detours) & (detours <= least) & (detours <= longest)
     rows, columns = np.nonzero(chosen)
     order = np.argsort(detours[chosen], kind="stable")
-    return np.column_stack([lattice.x[columns], lattice.y[rows]])[order]
+    return np.column_stack([lattice.x[columns], lattice.y[rows], detours[chosen]])[order]
 
 
 def _lead_through(

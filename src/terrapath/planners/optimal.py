@@ -37,6 +37,10 @@ from .rrt_star import RRTStar
 # every route that could be shorter. Elsewhere other searches follow, and finer fields.
 SURE = 1e-3
 
+# Routes that the fields say are longer by more than this share are not refined, once there are
+# as many as were asked for.
+MARGIN = 0.01
+
 # A finer field is solved where the best route may be this share longer than what a field says, at
 # least; and while that takes no more nodes than this.
 SLACK, MOST_NODES = 0.02, 2_000_000
@@ -166,15 +170,14 @@ class _Run:
         problem = self.problem
         if problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
             self.direct = problem.path([problem.start, problem.goal])
-            self.refine(self.direct)
 
     def try_fields(self) -> None:
         """The routes of distance fields, on a finer lattice where a coarse one shows none."""
         for lattice in lattices(self.problem, self.planner.spacing):
-            if self.try_fields_on(lattice) or self.stopper.stopped_by:
+            if self.try_fields_on(lattice, self.planner.routes) or self.stopper.stopped_by:
                 return
 
-    def try_fields_on(self, lattice: Lattice) -> bool:
+    def try_fields_on(self, lattice: Lattice, routes: int) -> bool:
         """The routes of the distance fields on a lattice; False where they show none."""
         problem = self.problem
         self.total = self.samples + 2 * lattice.nx * lattice.ny
@@ -189,7 +192,7 @@ class _Run:
         if path.length < self.best:
             self.direct = path
         if not self.must_stop():
-            self.refine_routes()
+            self.refine_routes(routes)
         self.is_sure = abs(self.distance - self.best) <= SURE * self.best
         return True
 
@@ -212,7 +215,7 @@ class _Run:
             spacing *= 0.5
             lattice = Lattice.spanning(self.window(), spacing)
             before = self.best
-            if lattice.nx * lattice.ny > MOST_NODES or not self.try_fields_on(lattice):
+            if lattice.nx * lattice.ny > MOST_NODES or not self.try_fields_on(lattice, 1):
                 return
             if self.is_sure and self.best >= before * (1.0 - GAIN):
                 return
@@ -240,13 +243,14 @@ class _Run:
             self.failures.append(error)
         self.keep(path)
 
-    def refine_routes(self) -> None:
+    def refine_routes(self, count: int) -> None:
         """Refine the routes of the fields; each is kept as soon as it is done."""
         try:
             for route in routes_of_fields(
                 self.problem,
                 *self.fields,
-                self.planner.routes,
+                count,
+                margin=MARGIN,
                 failed=self.failures.append,
                 must_stop=self.must_stop,
             ):
