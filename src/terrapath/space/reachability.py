@@ -143,14 +143,14 @@ class _Window:
     def outline(self) -> Array:
         """(m, 2, 2): the borders between blocked and free cells, each straight run one segment."""
         x, y = self.x.borders(), self.y.borders()
-        row, first, last = _runs(self.blocked)
+        row, first, last = runs(self.blocked)
         along_x = np.column_stack([x[first], y[row], x[last], y[row]])
-        column, first, last = _runs(self.blocked.T)
+        column, first, last = runs(self.blocked.T)
         along_y = np.column_stack([x[column], y[first], x[column], y[last]])
         return np.concatenate([along_x, along_y]).reshape(-1, 2, 2)
 
 
-def _runs(blocked: Cells) -> tuple[Indices, Indices, Indices]:
+def runs(blocked: Cells) -> tuple[Indices, Indices, Indices]:
     """Straight borders between rows: which border, and the first and last corner of each run."""
     rows = np.pad(blocked, ((1, 1), (0, 0)))
     border = np.pad(rows[1:] != rows[:-1], ((0, 0), (1, 1)))
