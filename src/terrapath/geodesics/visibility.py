@@ -36,12 +36,12 @@ from ..validation import Array
 
 # A surface is flat where its weighted slopes, and the logarithm of its cost, change by no more than
 # this. Lengths change by no more than that, relative.
-FLATNESS = 1e-8
+FLATNESS = 1e-7
 
 # The distance between a path and the corners that it bends round: a share of the region's side, but
 # not below the rounding of the largest coordinate.
 CLEARANCE = 1e-11
-ROUNDING = 2.0**-46
+ROUNDING = 2.0**-49
 # Free space widens the cells of masks by a margin; corners stand away by twice that.
 CELL_MARGINS = 2.0
 # The corners of a cell from its upper right one on: outwards, and along the walls that meet there,
@@ -58,7 +58,7 @@ CELL_CORNERS = np.array(
 # the end of a line.
 LEAST_TURN = 1e-9
 # The test of discs rounds more.
-DISC_ROUNDING = 2.0**-43
+DISC_ROUNDING = 2.0**-45
 
 # Discs become polygons around them, of so many corners for all, within these limits for each.
 DISC_CORNERS = 65_536

@@ -26,7 +26,7 @@ CLEARANCES = 2.0
 # Corners nearer to one another than this share of their clearance are the same place.
 SAME_PLACE = 0.01
 # The sector that is looked into is wider by this, radians: near by, rounding turns lines.
-WIDENED = 0.02
+WIDENED = 0.1
 
 
 class Search(NamedTuple):
