@@ -145,14 +145,11 @@ def _points(scene: sight.Scene, search: kernels.Search) -> Array:
 def _empty_search(scene: sight.Scene) -> kernels.Search:
     """A search that has only reached the start."""
     count = len(scene.corners)
-    cost = np.full(count, np.inf)
-    parent, slot = np.full(count, -1), np.full(count, kernels.UNSEEN)
-    search = kernels.Search(
-        cost, parent, cost.copy(), slot, np.empty(count, np.int64), np.zeros(1, np.int64)
-    )
-    start, goal = count - 2, count - 1
-    kernels.push(search, start, 0.0, -1, kernels.distance(scene, start, goal))
-    return search
+    start = count - 2
+    cost, key, slot = np.full(count, np.inf), np.empty(count), np.full(count, kernels.UNSEEN)
+    heap = np.empty(count, np.int64)
+    cost[start], key[start], slot[start], heap[0] = 0.0, 0.0, 0, start
+    return kernels.Search(cost, np.full(count, -1), key, slot, heap, np.ones(1, np.int64))
 
 
 def _empty_view(scene: sight.Scene) -> sight.View:
