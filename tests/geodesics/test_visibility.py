@@ -263,6 +263,25 @@ def test_nothing_is_left_for_refinement(name):
     assert tp.refine(problem, found).length == pytest.approx(found.length, rel=1e-9)
 
 
+BOX = np.pad(np.ones((2, 2), bool), 1)
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "away"),
+    # The cells of masks are widened by 2e-10.
+    [(mask_of(BOX), 3e-9), (mask_of(BOX), 1e-7)]
+    + [(shapely.box(0.5, 0.5, 2.5, 2.5), away) for away in (1e-12, 1e-10, 1e-8)],
+)
+def test_ends_may_be_nearer_to_a_corner_than_the_path(obstacle, away):
+    bounds = (-0.5, -0.5, 3.5, 3.5)
+    for angle in np.linspace(0.1, 1.4, 5):
+        end = (2.5 + away * math.cos(angle), 2.5 + away * math.sin(angle))
+        problem = problem_on([obstacle], (0.0, 1.0), end, bounds)
+        right = math.hypot(0.5, 1.5) + 2.0
+        for one in (problem, problem.between(end, (0.0, 1.0))):
+            assert length_of(one) == pytest.approx(right, abs=10 * away + 1e-8)
+
+
 # Discs, radius, areas
 
 

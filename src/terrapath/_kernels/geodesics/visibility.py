@@ -160,7 +160,10 @@ def sector(corners, c, px, py):
 
 @kernel
 def consider(scene, search, c, other, px, py):
-    """Go on from a corner, reached along (px, py), to another where that is shorter and taut."""
+    """Go on from a corner, reached along (px, py), to another where that is shorter and taut.
+
+    (px, py) is 0 where all directions are open.
+    """
     corners, length = scene.corners, distance(scene, c, other)
     cost = search.cost[c] + length
     if search.slot[other] == DONE or cost >= search.cost[other]:
@@ -174,7 +177,7 @@ def consider(scene, search, c, other, px, py):
     if not is_tangent(corners, other, dx, dy, turning + CLEARANCES * corners[other, CLEARANCE]):
         return
     slack = turning + CLEARANCES * corners[c, CLEARANCE]
-    if search.parent[c] >= 0 and not bends_round(corners, c, px, py, dx, dy, slack):
+    if (px != 0.0 or py != 0.0) and not bends_round(corners, c, px, py, dx, dy, slack):
         return
     if segment_is_free(scene.space, ax, ay, bx, by):
         goal = corners.shape[0] - 1
@@ -182,18 +185,34 @@ def consider(scene, search, c, other, px, py):
 
 
 @kernel
+def heading(corners, c, parent):
+    """The direction, of length 1, in which a corner is reached; 0 at the start.
+
+    Also 0 where the start is so near that it may be nearer to the obstacle than the corner is.
+    """
+    start = corners.shape[0] - 2
+    if c == start:
+        return 0.0, 0.0
+    px, py = corners[c, X] - corners[parent, X], corners[c, Y] - corners[parent, Y]
+    size = math.hypot(px, py)
+    if parent == start and size <= CLEARANCES * corners[c, CLEARANCE]:
+        return 0.0, 0.0
+    return px / size, py / size
+
+
+@kernel
 def expand(scene, search, view, c):
     """Look from a corner to the others, and go where it is worth it."""
-    corners, parent = scene.corners, search.parent[c]
-    x, y, px, py = corners[c, X], corners[c, Y], 0.0, 0.0
-    angle, width = 0.0, 2.0 * math.pi
-    if parent >= 0:
-        px, py = x - corners[parent, X], y - corners[parent, Y]
-        size = math.hypot(px, py)
-        px, py = px / size, py / size
+    corners, goal = scene.corners, scene.corners.shape[0] - 1
+    x, y, angle, width = corners[c, X], corners[c, Y], 0.0, 2.0 * math.pi
+    px, py = heading(corners, c, search.parent[c])
+    if px != 0.0 or py != 0.0:
         angle, width = sector(corners, c, px, py)
     for k in range(look(scene, view, c, x, y, angle, width)):
         consider(scene, search, c, view.found[k], px, py)
+    # So near, the goal may lie in any direction.
+    if math.hypot(corners[goal, X] - x, corners[goal, Y] - y) <= CLEARANCES * corners[c, CLEARANCE]:
+        consider(scene, search, c, goal, px, py)
 
 
 @kernel
