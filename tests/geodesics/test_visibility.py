@@ -402,6 +402,8 @@ def test_what_is_not_flat_is_told():
     bent = tp.Surface.from_grid(np.maximum(x - 5.0, 0.0) + 0.0 * x[:, None], x, x)
     whole = tp.Problem(bent, (1, 1), (2, 2))
     assert not is_flat(whole)
+    with pytest.raises(tp.InputError, match="not flat"):
+        shortest_taut_path(whole)
 
 
 # Kernels

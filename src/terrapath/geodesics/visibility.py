@@ -17,6 +17,7 @@ import shapely
 from .._kernels.geodesics import sight, visibility as kernels
 from .._kernels.space.free_space import list_edges
 from .._kernels.surface.surfaces import Peaks, Spline
+from ..errors import InputError
 from ..problem import Path, Problem
 from ..space.free_space import (
     POLYGON,
@@ -112,13 +113,15 @@ def _spline_is_flat(data: Spline, bounds: Bounds) -> bool:
 def shortest_taut_path(problem: Problem, *, watch: Watch | None = None) -> Taut:
     """The shortest path of a problem on flat ground, to 1e-9 relative.
 
-    The ground must be flat (``is_flat``). Discs are replaced by polygons around them: the path is
-    longer by less than 3e-7, relative, where there are up to 16 discs, and by less than 1e-3 where
-    there are more than 1,000. watch : may stop the search.
+    Discs are replaced by polygons around them: the path is longer by less than 3e-7, relative, where
+    there are up to 16 discs, and by less than 1e-3 where there are more than 1,000. watch : may stop
+    the search. Raises InputError where the ground is not flat.
 
     Source: A* over the taut part of the visibility graph; what is seen from a corner is found when
     the corner is settled.
     """
+    if not is_flat(problem):
+        raise InputError("the ground is not flat, so straight lines are not shortest; use optimal")
     if problem.start == problem.goal:
         return Taut(problem.path([problem.start, problem.goal]), True, 0.0)
     scene = _scene(problem)
