@@ -23,6 +23,11 @@ from .lattice import Lattice
 ITEMS_PER_CELL = 2.0
 MOST_CELLS_A_SIDE = 1024
 
+# The cells of masks are widened by this share of a cell, and by the rounding of coordinates: a few
+# units in the last place of the largest one.
+CELL_MARGIN = 2e-10
+COORDINATE_ERROR = 8.0 * 2.0**-53
+
 # In proofs of separation a disc is replaced by a polygon inside it, with this many corners.
 CORNERS_OF_DISC = 64
 
@@ -192,7 +197,7 @@ class FreeSpace:
         grid = index_grid(self.bounds, len(edges) + len(circles))
         edge_first, edge_ids = listed(kernels.list_edges, grid, edges)
         circle_first, circle_ids = listed(kernels.list_circles, grid, circles)
-        frames, shapes, blocked = _stack_masks(self.masks)
+        frames, shapes, blocked = _stack_masks(self.masks, self.bounds)
         return kernels.Space(
             grid,
             np.ascontiguousarray(edges),
@@ -336,17 +341,29 @@ def _cells_near(
     return np.ix_(j, i), low, high
 
 
-def _stack_masks(masks: Sequence[Mask]) -> tuple[Array, Indices, npt.NDArray[np.uint8]]:
+def cell_margin(mask: Mask, bounds: Bounds) -> float:
+    """By which share of a cell the cells of a mask are widened, to make up for rounding.
+
+    Nothing nearer than this to a blocked cell counts as free; ground a little farther away does.
+    """
+    largest = max(np.abs([*bounds, *mask.x[[0, -1]], *mask.y[[0, -1]]]))
+    return float(CELL_MARGIN + COORDINATE_ERROR * largest / min(mask.spacing))
+
+
+def _stack_masks(
+    masks: Sequence[Mask], bounds: Bounds
+) -> tuple[Array, Indices, npt.NDArray[np.uint8]]:
     """Masks one after another: frames, shapes and cells, as in ``Space``."""
     frames, shapes, cells, offset = [], [], [], 0
     for mask in masks:
         dx, dy = mask.spacing
-        frames.append([mask.x[0] - 0.5 * dx, mask.y[0] - 0.5 * dy, dx, dy])
+        corner = [mask.x[0] - 0.5 * dx, mask.y[0] - 0.5 * dy]
+        frames.append([*corner, dx, dy, cell_margin(mask, bounds)])
         shapes.append([mask.blocked.shape[1], mask.blocked.shape[0], offset])
         cells.append(mask.blocked.ravel().astype(np.uint8))
         offset += mask.blocked.size
     return (
-        np.array(frames, np.float64).reshape(-1, 4),
+        np.array(frames, np.float64).reshape(-1, 5),
         np.array(shapes, np.int64).reshape(-1, 3),
         np.concatenate([np.empty(0, np.uint8), *cells]),
     )

@@ -19,15 +19,16 @@ from .._kernels.space import free_space as kernels
 from ..surface import Mask
 from ..surface.bounds import Bounds
 from ..validation import Array, Point
+from .free_space import cell_margin
 from .lattice import Lattice
 
 Cells: TypeAlias = npt.NDArray[np.bool_]
 Indices: TypeAlias = npt.NDArray[np.intp]
 Lines: TypeAlias = npt.NDArray[np.object_]  # (m,) shapely.LineString
 
-# A strip of cells inside the bounds that is thinner than this share of a cell is left out. No path
-# fits there: for kernels, all ground within 1e-7 of a blocked cell is blocked.
-SLIVER = 1e-9
+# A strip of cells inside the bounds is left out where it is thinner than this share of the margin by
+# which kernels widen blocked cells: no path fits there.
+SLIVER = 0.5
 
 # Walls that do not touch, but come nearer than this share of the largest coordinate, leave a doubt.
 # Rounding moves the points where walls cross by less than a hundredth of that.
@@ -87,13 +88,14 @@ class _Axis:
     last: int
     low: float  # of the bounds
     high: float
+    sliver: float  # the thickest strip that is left out, a share of a cell
 
     @classmethod
-    def of(cls, centres: Array, size: float, low: float, high: float) -> _Axis:
+    def of(cls, centres: Array, size: float, low: float, high: float, sliver: float) -> _Axis:
         origin, count = float(centres[0]) - 0.5 * size, len(centres)
-        first = min(max(math.floor((low - origin) / size + SLIVER), -1), count)
-        last = min(max(math.ceil((high - origin) / size - SLIVER) - 1, first), count)
-        return cls(origin, size, first, last, low, high)
+        first = min(max(math.floor((low - origin) / size + sliver), -1), count)
+        last = min(max(math.ceil((high - origin) / size - sliver) - 1, first), count)
+        return cls(origin, size, first, last, low, high, sliver)
 
     def cell(self, x: float) -> int:
         """The index, counted from ``first``, of the cell that x lies in."""
@@ -104,7 +106,7 @@ class _Axis:
         """The borders of the cells; those within rounding of the bounds are put onto them."""
         lines = self.origin + self.size * np.arange(self.first, self.last + 2, dtype=np.float64)
         for edge in (self.low, self.high):
-            lines[np.abs(lines - edge) <= SLIVER * self.size] = edge
+            lines[np.abs(lines - edge) <= self.sliver * self.size] = edge
         return lines
 
 
@@ -118,9 +120,9 @@ class _Window:
 
     @classmethod
     def of(cls, mask: Mask, bounds: Bounds) -> _Window:
-        dx, dy = mask.spacing
-        x = _Axis.of(mask.x, dx, bounds.x1_min, bounds.x1_max)
-        y = _Axis.of(mask.y, dy, bounds.x2_min, bounds.x2_max)
+        (dx, dy), sliver = mask.spacing, SLIVER * cell_margin(mask, bounds)
+        x = _Axis.of(mask.x, dx, bounds.x1_min, bounds.x1_max, sliver)
+        y = _Axis.of(mask.y, dy, bounds.x2_min, bounds.x2_max, sliver)
         padded = np.pad(mask.blocked, 1)
         return cls(padded[y.first + 1 : y.last + 2, x.first + 1 : x.last + 2], x, y)
 
@@ -141,14 +143,14 @@ class _Window:
     def outline(self) -> Array:
         """(m, 2, 2): the borders between blocked and free cells, each straight run one segment."""
         x, y = self.x.borders(), self.y.borders()
-        row, first, last = _runs(self.blocked)
+        row, first, last = runs(self.blocked)
         along_x = np.column_stack([x[first], y[row], x[last], y[row]])
-        column, first, last = _runs(self.blocked.T)
+        column, first, last = runs(self.blocked.T)
         along_y = np.column_stack([x[column], y[first], x[column], y[last]])
         return np.concatenate([along_x, along_y]).reshape(-1, 2, 2)
 
 
-def _runs(blocked: Cells) -> tuple[Indices, Indices, Indices]:
+def runs(blocked: Cells) -> tuple[Indices, Indices, Indices]:
     """Straight borders between rows: which border, and the first and last corner of each run."""
     rows = np.pad(blocked, ((1, 1), (0, 0)))
     border = np.pad(rows[1:] != rows[:-1], ((0, 0), (1, 1)))

@@ -148,8 +148,8 @@ class Span(NamedTuple):
 
 def span_within(data: Spline, bounds: Bounds) -> Span:
     """Limits of the cost and the layers inside a rectangle, from the spline's coefficients."""
-    rows = _cells(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.log_cost.shape[1])
-    columns = _cells(bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.log_cost.shape[2])
+    rows = cells_within(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.log_cost.shape[1])
+    columns = cells_within(bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.log_cost.shape[2])
     logs, layers = data.log_cost[0, rows, columns], data.coefficients[:, rows, columns]
     slope = math.hypot(
         float(np.abs(np.diff(logs, axis=1)).max()) / data.dx,
@@ -163,7 +163,7 @@ def span_within(data: Spline, bounds: Bounds) -> Span:
     )
 
 
-def _cells(low: float, high: float, origin: float, step: float, count: int) -> slice:
+def cells_within(low: float, high: float, origin: float, step: float, count: int) -> slice:
     """The coefficients along an axis that determine the spline over [low, high].
 
     In a cell, the spline stays within the range of the four coefficients from its index on.

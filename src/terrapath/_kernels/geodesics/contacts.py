@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import kernel
-from ..space.free_space import Grid, span
+from ..space.free_space import INDEX_MARGIN, Grid, span
 
 
 class Walls(NamedTuple):
@@ -81,8 +81,8 @@ def wall_time(walls, e, x, y, dx, dy):
 def first_wall(walls, x, y, dx, dy):
     """The first wall that a moving point crosses, and when; -1 for none."""
     grid, best, hit = walls.grid, math.inf, -1
-    rows = span(min(y, y + dy), max(y, y + dy), grid.y0, grid.dy, grid.ny)
-    columns = span(min(x, x + dx), max(x, x + dx), grid.x0, grid.dx, grid.nx)
+    rows = span(min(y, y + dy), max(y, y + dy), grid.y0, grid.dy, grid.ny, INDEX_MARGIN)
+    columns = span(min(x, x + dx), max(x, x + dx), grid.x0, grid.dx, grid.nx, INDEX_MARGIN)
     for row in range(rows.first, rows.last + 1):
         for column in range(columns.first, columns.last + 1):
             cell = row * grid.nx + column
@@ -99,8 +99,8 @@ def first_corner(walls, ax, ay, ux, uy, bx, by, vx, vy, skipped, also_skipped):
     grid, best, hit = walls.grid, math.inf, -1
     low_x, high_x = min(ax, ax + ux, bx, bx + vx), max(ax, ax + ux, bx, bx + vx)
     low_y, high_y = min(ay, ay + uy, by, by + vy), max(ay, ay + uy, by, by + vy)
-    rows = span(low_y, high_y, grid.y0, grid.dy, grid.ny)
-    columns = span(low_x, high_x, grid.x0, grid.dx, grid.nx)
+    rows = span(low_y, high_y, grid.y0, grid.dy, grid.ny, INDEX_MARGIN)
+    columns = span(low_x, high_x, grid.x0, grid.dx, grid.nx, INDEX_MARGIN)
     for row in range(rows.first, rows.last + 1):
         for column in range(columns.first, columns.last + 1):
             cell = row * grid.nx + column

@@ -1,7 +1,8 @@
 """Does a segment stay in free space?
 
 A segment is called free only where this is certain despite rounding errors. A doubtful case
-counts as a hit, so no path that is returned touches an obstacle.
+counts as a hit, so no path that is returned touches an obstacle. The answer does not depend on
+which end comes first.
 Obstacles are closed sets: touching one is a hit.
 """
 
@@ -38,7 +39,7 @@ class Space(NamedTuple):
     circles: np.ndarray  # (c, 3) float64: centre and radius
     circle_first: np.ndarray
     circle_ids: np.ndarray
-    mask_frames: np.ndarray  # (k, 4) float64: x0, y0, dx, dy of each mask's first cell corner
+    mask_frames: np.ndarray  # (k, 5) float64: x0, y0, dx, dy of a mask's first cell, and its margin
     mask_shapes: np.ndarray  # (k, 3) int64: nx, ny and the offset in ``blocked``
     blocked: np.ndarray  # uint8, the cells of all masks one after another, row by row
 
@@ -50,36 +51,37 @@ class Span(NamedTuple):
     last: int
 
 
-# Cells are widened by this share of their size, far above rounding errors, so that a segment
-# that runs along a cell's border counts as crossing the cells on both sides.
-_MARGIN = 1e-7
+# Cells are widened by a margin, a share of their size that is above rounding errors, so that a
+# segment along a cell's border counts as crossing the cells on both sides. For the cells of an
+# index it may be generous, because an item listed too often is only tested once more.
+INDEX_MARGIN = 1e-7
 
 
 @kernel
-def span(low, high, origin, size, count):
+def span(low, high, origin, size, count, margin):
     """Cells of one axis that [low, high] touches, limited to the grid."""
-    first = math.floor(max((low - origin) / size - _MARGIN, 0.0))
-    last = math.floor(min((high - origin) / size + _MARGIN, count - 1.0))
+    first = math.floor(max((low - origin) / size - margin, 0.0))
+    last = math.floor(min((high - origin) / size + margin, count - 1.0))
     return Span(first, last)
 
 
 @kernel
-def rows_crossed(grid, ay, by):
+def rows_crossed(grid, ay, by, margin):
     """Rows of the grid that a segment touches."""
-    return span(min(ay, by), max(ay, by), grid.y0, grid.dy, grid.ny)
+    return span(min(ay, by), max(ay, by), grid.y0, grid.dy, grid.ny, margin)
 
 
 @kernel
-def columns_crossed(grid, row, ax, ay, bx, by):
+def columns_crossed(grid, row, ax, ay, bx, by, margin):
     """Columns that a segment touches inside one row of the grid."""
     low, high = 0.0, 1.0
     if ay != by:
-        bottom = grid.y0 + (row - _MARGIN) * grid.dy
-        top = grid.y0 + (row + 1 + _MARGIN) * grid.dy
+        bottom = grid.y0 + (row - margin) * grid.dy
+        top = grid.y0 + (row + 1 + margin) * grid.dy
         t0, t1 = (bottom - ay) / (by - ay), (top - ay) / (by - ay)
         low, high = max(min(t0, t1), 0.0), min(max(t0, t1), 1.0)
     x0, x1 = ax + low * (bx - ax), ax + high * (bx - ax)
-    return span(min(x0, x1), max(x0, x1), grid.x0, grid.dx, grid.nx)
+    return span(min(x0, x1), max(x0, x1), grid.x0, grid.dx, grid.nx, margin)
 
 
 # Twice the largest rounding error of an orientation determinant (Shewchuk 1997).
@@ -143,9 +145,9 @@ def mask_is_hit(space, mask, ax, ay, bx, by):
     """Does the segment touch a blocked cell of one mask?"""
     frame, shape = space.mask_frames[mask], space.mask_shapes[mask]
     grid = Grid(frame[0], frame[1], frame[2], frame[3], shape[0], shape[1])
-    rows = rows_crossed(grid, ay, by)
+    rows = rows_crossed(grid, ay, by, frame[4])
     for row in range(rows.first, rows.last + 1):
-        columns = columns_crossed(grid, row, ax, ay, bx, by)
+        columns = columns_crossed(grid, row, ax, ay, bx, by, frame[4])
         for column in range(columns.first, columns.last + 1):
             if space.blocked[shape[2] + row * shape[0] + column]:
                 return True
@@ -157,16 +159,19 @@ def segment_is_free(space, ax, ay, bx, by):
     """True where the closed segment a-b certainly touches no obstacle's boundary and no mask.
 
     With one end in free space that is the whole test: to reach the inside of an
-    obstacle a segment has to cross its boundary.
+    obstacle a segment has to cross its boundary. Rounding depends on the order of the ends, so
+    they are put into one order.
     """
+    if bx < ax or (bx == ax and by < ay):
+        ax, ay, bx, by = bx, by, ax, ay
     for mask in range(space.mask_shapes.shape[0]):
         if mask_is_hit(space, mask, ax, ay, bx, by):
             return False
     if space.edges.shape[0] == 0 and space.circles.shape[0] == 0:
         return True
-    rows = rows_crossed(space.grid, ay, by)
+    rows = rows_crossed(space.grid, ay, by, INDEX_MARGIN)
     for row in range(rows.first, rows.last + 1):
-        columns = columns_crossed(space.grid, row, ax, ay, bx, by)
+        columns = columns_crossed(space.grid, row, ax, ay, bx, by, INDEX_MARGIN)
         for column in range(columns.first, columns.last + 1):
             if cell_is_hit(space, row * space.grid.nx + column, ax, ay, bx, by):
                 return False
@@ -202,9 +207,9 @@ def list_edges(grid, edges, first, ids):
     """
     for e in range(edges.shape[0]):
         ax, ay, bx, by = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
-        rows = rows_crossed(grid, ay, by)
+        rows = rows_crossed(grid, ay, by, INDEX_MARGIN)
         for row in range(rows.first, rows.last + 1):
-            columns = columns_crossed(grid, row, ax, ay, bx, by)
+            columns = columns_crossed(grid, row, ax, ay, bx, by, INDEX_MARGIN)
             for column in range(columns.first, columns.last + 1):
                 enlist(e, row * grid.nx + column, first, ids)
 
@@ -214,8 +219,8 @@ def list_circles(grid, circles, first, ids):
     """As ``list_edges``, for circles, by their bounding boxes."""
     for c in range(circles.shape[0]):
         x, y, r = circles[c, 0], circles[c, 1], circles[c, 2]
-        rows = span(y - r, y + r, grid.y0, grid.dy, grid.ny)
-        columns = span(x - r, x + r, grid.x0, grid.dx, grid.nx)
+        rows = span(y - r, y + r, grid.y0, grid.dy, grid.ny, INDEX_MARGIN)
+        columns = span(x - r, x + r, grid.x0, grid.dx, grid.nx, INDEX_MARGIN)
         for row in range(rows.first, rows.last + 1):
             for column in range(columns.first, columns.last + 1):
                 enlist(c, row * grid.nx + column, first, ids)

@@ -217,7 +217,7 @@ def _indexed(bounds: Bounds, outline: Outline) -> tuple[kernels.Walls, grids.Spa
         np.empty((0, 3)),
         np.zeros(len(edge_first), np.int64),
         np.empty(0, np.int64),
-        np.empty((0, 4)),
+        np.empty((0, 5)),
         np.empty((0, 3), np.int64),
         np.empty(0, np.uint8),
     )
