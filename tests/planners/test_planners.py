@@ -197,14 +197,13 @@ def test_rrt_ends_as_soon_after_the_first_path_as_it_says(problem):
 @pytest.mark.parametrize("name", ["fast-marching", "optimal"])
 def test_where_the_nodes_show_no_way_finer_ones_are_tried(name, enclosed, monkeypatch):
     module = importlib.import_module(f"terrapath.planners.{name.replace('-', '_')}")
-    march, nodes = module.march_from, []
+    prepare, nodes = module.Medium, []
 
-    def march_and_note(surface, space, end, medium, **options):
-        field = march(surface, space, end, medium, **options)
-        nodes.append(field.lattice.nx)
-        return field
+    def prepare_and_note(surface, lattice, free_space):
+        nodes.append(lattice.nx)
+        return prepare(surface, lattice, free_space)
 
-    monkeypatch.setattr(module, "march_from", march_and_note)
+    monkeypatch.setattr(module, "Medium", prepare_and_note)
     solution = tp.plan(enclosed, name, spacing=0.4)
     assert solution.status is tp.Status.NOT_FOUND
     assert solution.stopped_by == "no path between the nodes"

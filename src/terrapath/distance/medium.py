@@ -25,7 +25,7 @@ BUCKET_SHARE = 4.0
 BUCKETS = 2**14
 
 # Nodes settled between two checks of the callback and of Ctrl-C.
-CHUNK = 100_000
+CHUNK = 20_000
 
 # The edges of all nodes are numbered in 31 bits; on the steepest ground a node has 64.
 MOST_NODES = (2**31 - 1) // (2 * star.HALF)

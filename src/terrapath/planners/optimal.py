@@ -9,11 +9,12 @@ from functools import partial
 
 import numpy as np
 
-from ..distance.field import DistanceField, march_both
+from ..distance.field import march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
 from ..geodesics.alternatives import is_same, routes_of_fields, shortest
 from ..geodesics.refinement import refine
+from ..geodesics.visibility import is_flat, shortest_taut_path
 from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
@@ -62,7 +63,8 @@ class Optimal:
     region's longer side, or a cell of the map where that is less. time_limit : seconds, checked
     between the stages.
 
-    Candidates are the straight line and the routes of the distance fields from both ends. Where
+    Candidates are the straight line, on flat ground the shortest path round the corners of
+    obstacles, and the routes of the distance fields from both ends. Where
     the fields leave a doubt, on rough ground and among obstacles, A* with 32, 16 and 8 neighbours,
     a tree, and fields on ever finer lattices follow. All are refined. The route from a start to a
     goal is the same as back.
@@ -116,12 +118,13 @@ class _Run:
         self.problem = problem
         if self.is_reversed:
             self.problem = problem.between_checked(problem.goal, problem.start)
-        self.samples, self.total = 0, 0
+        first = next(lattices(self.problem, planner.spacing))
+        self.samples, self.total = 0, 2 * first.nx * first.ny
         self.direct: Path | None = None
         self.found: list[Path] = []
         self.failures: list[Exception] = []
         self.trying = SEARCHING
-        self.is_sure = False
+        self.is_exact = self.is_sure = False
 
     @property
     def best(self) -> float:
@@ -157,6 +160,8 @@ class _Run:
     def searches(self) -> Iterator[tuple[str, Callable[[], None]]]:
         """The searches in their order, with what the progress calls each."""
         yield "trying the straight line", self.try_straight_line
+        if is_flat(self.problem):
+            yield "trying the corners of obstacles", self.try_corners
         yield "trying distance fields", self.try_fields
         for neighbours in NEIGHBOURS:
             what = f"trying A* with {neighbours} neighbours"
@@ -170,6 +175,14 @@ class _Run:
         problem = self.problem
         if problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
             self.direct = problem.path([problem.start, problem.goal])
+
+    def try_corners(self) -> None:
+        """The exact shortest path on flat ground."""
+        taut = shortest_taut_path(self.problem, watch=self.must_stop)
+        if taut.path is None:
+            return
+        self.is_exact = not self.problem.free_space.circles
+        self.refine(taut.path)
 
     def try_fields(self) -> None:
         """The routes of distance fields, on a finer lattice where a coarse one shows none."""
@@ -193,7 +206,8 @@ class _Run:
             self.direct = path
         if not self.must_stop():
             self.refine_routes(routes)
-        self.is_sure = abs(self.distance - self.best) <= SURE * self.best
+        is_close = abs(self.distance - self.best) <= SURE * self.best
+        self.is_sure = self.is_exact or is_close
         return True
 
     @property
