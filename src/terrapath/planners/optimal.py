@@ -44,7 +44,7 @@ MARGIN = 0.01
 
 # A finer field is solved where the best route may be this share longer than what a field says, at
 # least; and while that takes no more nodes than this.
-SLACK, MOST_NODES = 0.02, 2_000_000
+SLACK, MOST_NODES = 0.02, 1_000_000
 
 # A search that shortens the best route by no more than this share has found nothing.
 GAIN = 1e-6
@@ -65,9 +65,9 @@ class Optimal:
 
     Candidates are the straight line, on flat ground the shortest path round the corners of
     obstacles, and the routes of the distance fields from both ends. Where
-    the fields leave a doubt, on rough ground and among obstacles, A* with 32, 16 and 8 neighbours,
-    a tree, and fields on ever finer lattices follow. All are refined. The route from a start to a
-    goal is the same as back.
+    the fields leave a doubt, on rough ground and among obstacles, fields on ever finer lattices
+    follow, A* with 32, 16 and 8 neighbours, and a tree. All are refined. The route from a start to
+    a goal is the same as back.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
     field; it is also the path returned where the run ends before a route was refined.
@@ -163,11 +163,11 @@ class _Run:
         if is_flat(self.problem):
             yield "trying the corners of obstacles", self.try_corners
         yield "trying distance fields", self.try_fields
+        yield "trying finer fields", self.try_finer_fields
         for neighbours in NEIGHBOURS:
             what = f"trying A* with {neighbours} neighbours"
             yield what, partial(self.try_planner, AStar(neighbours=neighbours))
         yield "trying a tree", partial(self.try_planner, RRTStar())
-        yield "trying finer fields", self.try_finer_fields
 
     # Searches
 
@@ -225,7 +225,7 @@ class _Run:
         """Fields on ever finer lattices, where a shorter route could lead."""
         lattice = self.fields[0].lattice
         spacing = max(lattice.dx, lattice.dy)
-        while not self.must_stop():
+        while math.isfinite(self.best) and not self.must_stop():
             spacing *= 0.5
             lattice = Lattice.spanning(self.window(), spacing)
             before = self.best
@@ -295,10 +295,11 @@ class _Run:
 
     def answer(self) -> Solution:
         """What was found, without a lower bound."""
-        known = self.found or ([] if self.direct is None else [self.direct])
+        known, direct = self.found, self.direct
+        if direct is not None and all(route.length > direct.length for route in known):
+            known, direct = [direct, *known], None  # it could not be refined, or not yet
         routes = [self.directed(route) for route in shortest(known, self.planner.routes)]
         path = routes[0] if routes else None
-        direct = None if self.direct is None or not self.found else self.directed(self.direct)
         return Solution(
             problem=self.given,
             planner=self.planner.name,
@@ -308,7 +309,7 @@ class _Run:
             seconds=self.stopper.seconds,
             samples=self.samples,
             stopped_by=self.stopper.stopped_by or "no path between the nodes",
-            unrefined=direct,
+            unrefined=None if direct is None else self.directed(direct),
             alternatives=tuple(routes[1:]),
         )
 
