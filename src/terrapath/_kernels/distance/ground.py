@@ -60,8 +60,9 @@ MOST_SAVED = 0.05
 # The slope across is measured this far on either side, as a share of the length.
 ACROSS = 0.25
 
-# Pieces that exceed their chord by less than this share are straight enough.
-STRAIGHT = 1e-6
+# Where the sag's square is at most this share of the chord's, the two halves are longer than the
+# chord by 2 |d|^2 / |v|, with a relative error of about this share.
+SLIGHT = 1e-4
 
 
 @inner_kernel
@@ -88,21 +89,18 @@ def plus_rise(lift, z0, z1, z2, w):
 
 
 @inner_kernel
-def exceeds_chord(lift):
-    """By how much a piece without costs exceeds its chord, as a share of it."""
-    one = sqrt(lift.vv)
-    return max((sqrt(lift.first) + sqrt(lift.second)) / one - 1.0, 0.0) * (4.0 / 3.0)
-
-
-@inner_kernel
-def left_by_bending(lift):
-    """The share of the excess that bending across leaves."""
-    across = lift.ww - lift.vw * lift.vw / lift.vv
-    sag = lift.dd - lift.dv * lift.dv / lift.vv
-    if not (across > 0.0 and sag > 0.0):
-        return 1.0
-    both = lift.dw - lift.dv * lift.vw / lift.vv
-    return max(1.0 - both * both / (across * sag), 0.0)
+def bent(lift):
+    """The length of a piece as Richardson's value has it, less what bending across saves."""
+    per = 1.0 / lift.vv
+    chord, sag = sqrt(lift.vv), lift.dd - lift.dv * lift.dv * per
+    across = lift.ww - lift.vw * lift.vw * per
+    both = lift.dw - lift.dv * lift.vw * per
+    left = max(sag - both * both / across, 0.0) if across > 0.0 else sag
+    if lift.dd <= SLIGHT * lift.vv:
+        return chord * (1.0 + 8.0 / 3.0 * left * per)
+    # The two halves are together at least as long as the chord, but for rounding.
+    excess = max(sqrt(lift.first) + sqrt(lift.second) - chord, 0.0)
+    return chord + 4.0 / 3.0 * excess * (left / sag if sag > 0.0 else 0.0)
 
 
 @inner_kernel
@@ -117,14 +115,6 @@ def mean_cost(lift, c):
     slope = (c.across - (c.end - c.begin) * lift.vw / lift.vv) / c.middle
     saved = slope * slope / across * lift.vv / 24.0
     return mean * (1.0 - min(saved, MOST_SAVED))
-
-
-@inner_kernel
-def bent(lift, excess):
-    """The length of a piece that exceeds its chord by a share ``excess`` where it is straight."""
-    if excess <= STRAIGHT:
-        return sqrt(lift.vv) * (1.0 + excess)
-    return sqrt(lift.vv) * (1.0 + excess * left_by_bending(lift))
 
 
 @inner_kernel
@@ -158,7 +148,7 @@ def sampled_piece(ground, i, j, ex, ey):
         z = ground.heights[layer]
         w = 0.5 * (z[jr, ir] - z[jl, il])
         lift = plus_rise(lift, z[j, i], z[j1, i1], z[j2, i2], w)
-    length = bent(lift, exceeds_chord(lift))
+    length = bent(lift)
     if ground.costs.shape[0] == 0:
         return length
     c = ground.costs[0]
@@ -250,7 +240,7 @@ def piece(ground, x0, y0, x2, y2):
     for layer in range(z.shape[0]):
         across = slope_along(z, layer, p1, -dy, dx)
         lift = plus_rise(lift, read(z, layer, p0), read(z, layer, p1), read(z, layer, p2), across)
-    length = bent(lift, exceeds_chord(lift))
+    length = bent(lift)
     if ground.costs.shape[0] == 0:
         return length
     costs = Costs(
@@ -275,8 +265,13 @@ def gain_by_bending(ground, x0, y0, x2, y2):
         z = ground.heights
         w = 0.5 * (read(z, layer, right) - read(z, layer, left))
         lift = plus_rise(lift, read(z, layer, p0), read(z, layer, p1), read(z, layer, p2), w)
+    both = lift.dw - lift.dv * lift.vw / lift.vv
+    across = lift.ww - lift.vw * lift.vw / lift.vv
+    sag = lift.dd - lift.dv * lift.dv / lift.vv
+    if not (across > 0.0 and sag > 0.0):
+        return 0.0
     halves = sqrt(lift.first) + sqrt(lift.second) - sqrt(lift.vv)
-    return ground.floor * max(halves, 0.0) * (1.0 - left_by_bending(lift))
+    return ground.floor * max(halves, 0.0) * min(both * both / (across * sag), 1.0)
 
 
 @inner_kernel
@@ -322,7 +317,7 @@ def surface_piece(surface, ax, ay, bx, by):
         sqrt(squared_cost_at(surface, b)),
         c * (vx * rise.fy - vy * rise.fx),
     )
-    cost = bent(lift, exceeds_chord(lift)) * mean_cost(lift, costs)
+    cost = bent(lift) * mean_cost(lift, costs)
     return max(cost, floor_of(surface) * sqrt(lift.vv))
 
 

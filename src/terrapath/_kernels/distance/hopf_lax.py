@@ -18,7 +18,7 @@ import numpy as np
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
 from .calendar_queue import QUEUED, dequeue, enqueue, least
-from .ground import Costs, bent, costed, exceeds_chord, flat, place_at, plus_rise, ray, read
+from .ground import Costs, bent, costed, flat, place_at, plus_rise, ray, read
 from .segments import LEAST_T, NOWHERE, Place, Segment, place_of_least, value_on
 from .star import EAST, HALF, NORTH, beside, direction_between, entry_of
 
@@ -221,7 +221,7 @@ def in_triangle(medium, source, node, ka, kb, t):
         lift = plus_rise(lift, z[n, layer], middle, begin, across)
         rise = begin - source.lift[layer]
         squared += rise * rise
-    cost = bent(lift, exceeds_chord(lift))
+    cost = bent(lift)
     if ground.costs.shape[0] > 0:
         c = ground.costs[0]
         ca, cb, cn = c[j + 2 * aj, i + 2 * ai], c[j + 2 * bj, i + 2 * bi], c[j, i]
