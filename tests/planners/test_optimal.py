@@ -7,7 +7,8 @@ import pytest
 import shapely
 
 import terrapath as tp
-from common import FLAT, REGION, mostly_slow
+from common import FLAT, REAL_MAPS, REGION, mostly_slow
+from planner_oracles import visibility_length
 from terrapath.errors import UnfinishedWarning
 from terrapath.geodesics import alternatives
 from terrapath.planners import optimal
@@ -252,3 +253,64 @@ def test_a_gap_finer_than_the_default_nodes_is_found():
     assert solution.status is tp.Status.SOLVED
     over = np.hypot(3.0, 2.0) + 0.2 + np.hypot(2.8, 2.0)
     assert solution.length == pytest.approx(over, rel=1e-5)
+
+
+# Rough ground, and among obstacles
+
+
+AXIS = 5.0 + 10.0 * np.arange(40)
+
+
+def rough_problem(seed, weight=10.0):
+    random, f = np.random.default_rng([14, seed]), np.fft.fftfreq(40)
+    size = np.hypot(f[:, None], f[None])
+    size[0, 0] = 1.0
+    heights = np.fft.ifft2(np.fft.fft2(random.normal(size=(40, 40))) * size**-1.8).real
+    heights *= 25.0 / heights.std()
+    surface = tp.Surface.from_grid(heights, AXIS, AXIS, weights=[weight])
+    start, goal = random.uniform(15.0, 385.0, (2, 2))
+    return tp.Problem(surface, start, goal)
+
+
+@pytest.mark.parametrize("seed", mostly_slow(range(6), quick=2))
+def test_on_rough_ground_it_is_beaten_by_no_planner_and_the_same_back(seed):
+    problem = rough_problem(seed)
+    best = tp.plan(problem, "optimal", target_gap=10.0)
+    back = tp.plan(problem.between(problem.goal, problem.start), "optimal", target_gap=10.0)
+    assert back.length == pytest.approx(best.length, rel=1e-9)
+    assert np.allclose(back.path.points[::-1], best.path.points, rtol=0.0, atol=1e-9)
+    others = [("dijkstra", {"neighbours": n}) for n in (8, 16, 32)]
+    others += [("a-star", {"neighbours": 32}), ("fast-marching", {}), ("rrt-star-r", {})]
+    for name, options in others:
+        found = tp.plan(problem, name, refine=True, **options)
+        assert best.length <= found.length * (1.0 + 1e-6), name
+    assert best.length <= problem.straight_length
+
+
+def test_among_boxes_on_flat_ground_it_is_exact():
+    random = np.random.default_rng(8)
+    corners = random.uniform(0.0, 9.0, (40, 2))
+    boxes = [shapely.box(x, y, x + 0.9, y + 0.5) for x, y in corners]
+    problem = tp.Problem(FLAT, (-0.5, -0.5), (10.5, 10.5), REGION, boxes)
+    solution = tp.plan(problem, "optimal", target_gap=10.0)
+    truth = visibility_length(problem.start, problem.goal, boxes, REGION)
+    assert solution.length == pytest.approx(truth, rel=1e-6)
+    assert solution.path.line.disjoint(shapely.union_all(boxes))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not REAL_MAPS.exists(), reason="the real maps are not beside this clone")
+def test_the_steep_volcano():
+    surface = tp.read_surface(REAL_MAPS / "SainteHelens.dem").with_weights({"height": 10.0})
+    problem = tp.Problem(surface, (558798, 5109381), (566622, 5120589))
+    assert tp.plan(problem, "optimal", target_gap=10.0).length <= 21_536  # 21,297
+
+
+@pytest.mark.skipif(not REAL_MAPS.exists(), reason="the real maps are not beside this clone")
+def test_a_quarry_in_open_ground_is_passed():
+    quarry = REAL_MAPS.parent / "cases" / "quarry.tif"
+    surface = tp.read_surface(quarry).with_weights({"height": 10.0})
+    problem = tp.Problem(surface, (500155, 4000300), (500505, 4000300))
+    for name in ("optimal", "fast-marching", "dijkstra", "rrt-star-r"):
+        solution = tp.plan(problem, name, refine=True)
+        assert solution.length == pytest.approx(1234.77, rel=1e-4), name
