@@ -26,8 +26,8 @@ Cells: TypeAlias = npt.NDArray[np.bool_]
 Indices: TypeAlias = npt.NDArray[np.intp]
 Lines: TypeAlias = npt.NDArray[np.object_]  # (m,) shapely.LineString
 
-# A strip of cells inside the bounds is left out where it is thinner than this share of the margin by
-# which kernels widen blocked cells: no path fits there.
+# A strip of cells inside the bounds is left out where it is thinner than this share of the margin
+# that kernels add to blocked cells: no path fits there.
 SLIVER = 0.5
 
 # Walls that do not touch, but come nearer than this share of the largest coordinate, leave a doubt.

@@ -117,6 +117,44 @@ def first_corner(walls, ax, ay, ux, uy, bx, by, vx, vy, skipped, also_skipped):
 
 
 @kernel
+def strip_depth(walls, e, x, y):
+    """How far behind a wall a point is; infinite for a point in front of it or beside it."""
+    ax, ay, bx, by = walls.edges[e, 0], walls.edges[e, 1], walls.edges[e, 2], walls.edges[e, 3]
+    depth = walls.normals[e, 0] * (ax - x) + walls.normals[e, 1] * (ay - y)
+    ahead_x, ahead_y = bx - ax, by - ay
+    along = (x - ax) * ahead_x + (y - ay) * ahead_y
+    beside = along < 0.0 or along > ahead_x * ahead_x + ahead_y * ahead_y
+    return math.inf if beside or depth <= 0.0 else depth
+
+
+@kernel
+def wall_before(walls, strips, widest, x, y):
+    """The wall in whose strip a point is least deep, and how deep; -1 for none."""
+    grid, least, hit = walls.grid, math.inf, -1
+    rows = span(y - widest, y + widest, grid.y0, grid.dy, grid.ny, INDEX_MARGIN)
+    columns = span(x - widest, x + widest, grid.x0, grid.dx, grid.nx, INDEX_MARGIN)
+    for row in range(rows.first, rows.last + 1):
+        for column in range(columns.first, columns.last + 1):
+            cell = row * grid.nx + column
+            for k in range(walls.edge_first[cell], walls.edge_first[cell + 1]):
+                e = walls.edge_ids[k]
+                depth = strip_depth(walls, e, x, y)
+                if depth < strips[e] and depth < least:
+                    least, hit = depth, e
+    return least, hit
+
+
+@kernel
+def fill_strips(walls, strips, widest, points, hits, depths):
+    """The wall in whose strip each point is: hits (m,), -1 for none, and depths (m,).
+
+    strips (e,) : the width of the strip behind each wall, up to its obstacle. widest : of them.
+    """
+    for m in range(points.shape[0]):
+        depths[m], hits[m] = wall_before(walls, strips, widest, points[m, 0], points[m, 1])
+
+
+@kernel
 def fill_walls(walls, points, moves, times, hits):
     """The first wall that each moving point crosses: times (m,), infinite for none, hits (m,)."""
     for m in range(points.shape[0]):

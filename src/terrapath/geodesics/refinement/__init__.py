@@ -50,7 +50,7 @@ def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = T
         found = problem.path(points)
         # Of two that are equally long, the later one has fewer points.
         longest = min(best.length * (1.0 + tolerance), given.length * (1.0 + ROUNDING))
-        if _is_allowed(problem, points) and found.length <= longest:
+        if problem.free_space.allows(points) and found.length <= longest:
             best = found
     return best
 
@@ -101,12 +101,6 @@ def _require_free(problem: Problem, points: Array) -> None:
             f"the path's segment ({ax:.10g}, {ay:.10g}) to ({bx:.10g}, {by:.10g}) touches an "
             "obstacle; refine a path through free space"
         )
-
-
-def _is_allowed(problem: Problem, points: Array) -> bool:
-    """Does the polyline stay within the bounds and in free space?"""
-    inside = problem.bounds.contains(points).all()
-    return bool(inside and problem.free_space.segments_are_free(points[:-1], points[1:]).all())
 
 
 def _refined(problem: Problem, given: Path, tolerance: float) -> Iterator[Array]:

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..._kernels.geodesics import contacts as kernels
 from ..._kernels.space import free_space as grids
-from ...space.free_space import FreeSpace, Indices, index_grid, listed
+from ...space.free_space import FreeSpace, Indices, cell_margin, index_grid, listed
 from ...surface import Mask
 from ...surface.bounds import Bounds
 from ...validation import Array
@@ -25,8 +25,8 @@ from ...validation import Array
 SLACK = 0.01
 # At a corner walls are extended by this share of what would make them meet.
 SHORTENED = 0.98
-# Free space itself widens the cells of masks; this share of a cell is a little more than that.
-CELL_CLEARANCE = 3e-7
+# Free space itself widens the cells of masks; walls stand away from them by twice that, and more.
+CELL_MARGINS = 2.0
 # A corner turns by more than this, radians.
 LEAST_TURN = 1e-9
 
@@ -70,6 +70,11 @@ class Surroundings:
     discs: Indices
     wall_discs: Indices
     sides: Indices
+
+    @property
+    def strips(self) -> Array:
+        """(e,), the width of the strip between each wall and its obstacle, map units."""
+        return (1.0 - SLACK) * self.clearance
 
 
 def _ring(points: Array, clearance: float) -> Outline:
@@ -128,7 +133,6 @@ def _disc(x: float, y: float, radius: float, sides: int) -> Array:
 def _mask(mask: Mask, clearance: float) -> Outline:
     """The outline of a mask's blocked cells."""
     dx, dy = mask.spacing
-    clearance += CELL_CLEARANCE * max(dx, dy)
     blocked = np.pad(mask.blocked, 1)
     node_x = mask.x[0] - 0.5 * dx + dx * np.arange(mask.blocked.shape[1] + 1)
     node_y = mask.y[0] - 0.5 * dy + dy * np.arange(mask.blocked.shape[0] + 1)
@@ -181,7 +185,9 @@ def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surround
     parts = [_bounds(space.bounds, clearance)]
     for geometry in space.geometries:
         parts += [_ring(ring, clearance) for ring in _rings(geometry)]
-    parts += [_mask(mask, clearance) for mask in space.masks]
+    for mask in space.masks:
+        widened = CELL_MARGINS * cell_margin(mask, space.bounds) * max(mask.spacing)
+        parts.append(_mask(mask, clearance + widened))
     plain = Outline.joined(parts)
     for circle, count in zip(space.circles, sides, strict=True):
         ring = _disc(circle.x1, circle.x2, circle.radius, int(count))
