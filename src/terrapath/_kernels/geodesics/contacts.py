@@ -23,6 +23,7 @@ class Walls(NamedTuple):
     edge_first: np.ndarray  # (cells + 1,) int64
     edge_ids: np.ndarray  # int64
     corners: np.ndarray  # (c, 2) float64
+    outwards: np.ndarray  # (c, 2) float64: from each corner to where a path is held by it
     corner_first: np.ndarray
     corner_ids: np.ndarray
 
@@ -59,6 +60,24 @@ def corner_time(ax, ay, ux, uy, bx, by, vx, vy, cx, cy):
             return max(t, 0.0)
         t = first_root(q0, q1, q2, t)
     return math.inf
+
+
+@kernel
+def is_passed(ax, ay, ux, uy, bx, by, vx, vy, cx, cy, ox, oy):
+    """Does the moving segment a-b already lie a little behind the corner c, and go on from there?
+
+    Rounding puts it there where a path meets several corners at once. (ox, oy) points outwards,
+    and how far a segment may be behind is measured by it.
+    """
+    ex, ey, wx, wy = bx - ax, by - ay, cx - ax, cy - ay
+    outside, behind = ex * oy - ey * ox, ex * wy - ey * wx
+    if behind * outside < 0.0 or behind * behind > 4.0 * (ox * ox + oy * oy) * (ex * ex + ey * ey):
+        return False
+    along = wx * ex + wy * ey
+    if along < 0.0 or along > ex * ex + ey * ey:
+        return False
+    change = (vx - ux) * wy - (vy - uy) * wx - ex * uy + ey * ux
+    return change * outside > 0.0
 
 
 @kernel
@@ -110,6 +129,9 @@ def first_corner(walls, ax, ay, ux, uy, bx, by, vx, vy, skipped, also_skipped):
                 if c in (skipped, also_skipped) or not low_x <= cx <= high_x:
                     continue
                 if low_y <= cy <= high_y:
+                    ox, oy = walls.outwards[c, 0], walls.outwards[c, 1]
+                    if is_passed(ax, ay, ux, uy, bx, by, vx, vy, cx, cy, ox, oy):
+                        return 0.0, c
                     t = corner_time(ax, ay, ux, uy, bx, by, vx, vy, cx, cy)
                     if t < best:
                         best, hit = t, c

@@ -21,6 +21,8 @@ from .walls import Surroundings, surroundings
 
 # The distance between a path and what it touches, as a share of the region's side.
 CLEARANCE = 1e-8
+# And at least this share of the largest coordinate, so that a hundredth of it is above rounding.
+LEAST_CLEARANCE = 2.0**-44
 # Where obstacles leave no room for that, a tenth of the clearance is tried, and so on.
 CLEARANCE_ATTEMPTS = 4
 
@@ -93,8 +95,10 @@ def _cleared(space: FreeSpace, points: Array) -> tuple[Surroundings, Array] | No
     The clearance is the largest one that the path keeps or can be moved to keep; None where even
     the smallest one leaves no room.
     """
+    largest = float(np.abs(space.bounds).max())
+    widest = max(CLEARANCE * space.bounds.side, LEAST_CLEARANCE * largest)
     for attempt in range(CLEARANCE_ATTEMPTS):
-        clearance = CLEARANCE * space.bounds.side * 0.1**attempt
+        clearance = widest * 0.1**attempt
         sides = np.array([_sides_clear_of(points, c, clearance) for c in space.circles], int)
         around = surroundings(space, clearance, sides)
         cleared = points if is_clear(around, points) else moved_clear(space, around, points)

@@ -212,8 +212,9 @@ def _indexed(bounds: Bounds, outline: Outline) -> tuple[kernels.Walls, grids.Spa
     edge_first, edge_ids = listed(grids.list_edges, grid, edges)
     corner_first, corner_ids = listed(grids.list_edges, grid, np.hstack([tips, tips]))
     normals = np.ascontiguousarray(outline.normals)
+    outwards = outline.corners - outline.tips
     walls = kernels.Walls(
-        grid, edges, normals, edge_first, edge_ids, tips, corner_first, corner_ids
+        grid, edges, normals, edge_first, edge_ids, tips, outwards, corner_first, corner_ids
     )
     space = grids.Space(
         grid,
