@@ -16,7 +16,7 @@ import shapely
 import planner_oracles as oracles
 import terrapath as tp
 from terrapath._kernels.planners import grid_search as kernels
-from terrapath.planners import grid_search, make_planner
+from terrapath.planners import base, grid_search, make_planner
 from terrapath.planners.rrt_star import FEATURES_PER_PANEL
 from terrapath.problem import scenes
 from terrapath.space.lattice import Lattice
@@ -436,12 +436,13 @@ def test_a_start_in_a_pocket_without_a_node_nearby_sees_one_farther_off(name):
 
 @EVERY
 @pytest.mark.parametrize("swap", [False, True])
-def test_an_end_that_sees_no_node_is_a_result_that_says_so(name, swap):
+def test_an_end_that_sees_no_node_is_a_result_that_says_so(name, swap, monkeypatch):
     # A bent corridor: there is a way out, but no straight one.
     room = shapely.box(2.1, 2.1, 2.9, 2.9) - shapely.box(2.2, 2.2, 2.8, 2.8)
     room -= shapely.LineString([(2.75, 2.5), (2.85, 2.5), (2.85, 2.95)]).buffer(0.025)
     ends = [(2.3, 2.3), (9.0, 9.0)]
     problem = tp.Problem(FLAT, *(ends[::-1] if swap else ends), (0, 0, 10, 10), [room])
+    monkeypatch.setattr(base, "HALVINGS", 0)
     solution = tp.plan(problem, name, spacing=1.0)
     assert solution.status is tp.Status.NOT_FOUND
     assert solution.stopped_by == f"no node can be seen from the {'goal' if swap else 'start'}"

@@ -9,6 +9,7 @@ than about the clearance, so the path passes each obstacle on the same side as b
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from ..._kernels.geodesics import contacts as kernels
@@ -42,8 +43,8 @@ def is_clear(around: Surroundings, points: Array) -> bool:
     return bool((_walls_behind(around, points)[0] < 0).all() and _are_clear(around, points).all())
 
 
-def _are_clear(around: Surroundings, points: Array) -> Array:
-    """(m - 1,) bool, which segments of a path cross no wall."""
+def _are_clear(around: Surroundings, points: Array) -> npt.NDArray[np.bool_]:
+    """(m - 1,), which segments of a path cross no wall."""
     free = np.empty(len(points) - 1, np.uint8)
     grids.fill_free(around.space, points[:-1], points[1:], free)
     return free.astype(bool)

@@ -21,8 +21,8 @@ from .walls import Surroundings, surroundings
 
 # The distance between a path and what it touches, as a share of the region's side.
 CLEARANCE = 1e-8
-# And at least this share of the largest coordinate, so that a hundredth of it is above rounding.
-LEAST_CLEARANCE = 2.0**-44
+# And at least this share of the largest coordinate, so that it is far above rounding.
+LEAST_CLEARANCE = 2.0**-46
 # Where obstacles leave no room for that, a tenth of the clearance is tried, and so on.
 CLEARANCE_ATTEMPTS = 4
 
