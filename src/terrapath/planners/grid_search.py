@@ -280,8 +280,7 @@ def _path(search: _Search) -> Path | None:
     # A start or goal that lies on a node is a vertex twice.
     points = points[np.append((points[1:] != points[:-1]).any(axis=1), True)]
     bends = points[_are_bends(points)]
-    are_free = search.problem.free_space.segments_are_free(bends[:-1], bends[1:]).all()
-    return search.problem.path(bends if are_free else points)
+    return search.problem.path(bends if search.problem.allows(bends) else points)
 
 
 def _are_bends(points: Array) -> npt.NDArray[np.bool_]:

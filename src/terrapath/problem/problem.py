@@ -155,6 +155,14 @@ class Problem:
         """The path on this problem's surface through points (m, 2), map units."""
         return Path(self.surface, np.asarray(points, np.float64))
 
+    def allows(self, path: Path | npt.ArrayLike) -> bool:
+        """Does a path, given by its points (m, 2), stay in the bounds and touch no obstacle?
+
+        One of its points must be free. It is the same forwards and backwards.
+        """
+        points = path.points if isinstance(path, Path) else np.asarray(path, np.float64)
+        return self.free_space.allows(points)
+
     @property
     def default_spacing(self) -> float:
         """The default spacing of lattice nodes, map units."""

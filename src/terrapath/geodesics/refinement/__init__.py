@@ -50,7 +50,7 @@ def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = T
         found = problem.path(points)
         # Of two that are equally long, the later one has fewer points.
         longest = min(best.length * (1.0 + tolerance), given.length * (1.0 + ROUNDING))
-        if problem.free_space.allows(points) and found.length <= longest:
+        if problem.allows(points) and found.length <= longest:
             best = found
     return best
 
