@@ -613,7 +613,7 @@ def test_more_nodes_than_can_be_numbered_are_refused(name, problem):
 
 @EVERY
 @pytest.mark.parametrize("kind", occupancy.KINDS)
-@pytest.mark.parametrize("side", [11, *mostly_slow([320], quick=0)])
+@pytest.mark.parametrize("side", [11, *mostly_slow([260], quick=0)])
 def test_what_free_cells_join_is_found_as_a_mask_and_as_polygons(name, kind, side):
     random = np.random.default_rng(side)
     blocked = occupancy.grid_of(kind, random, side)
