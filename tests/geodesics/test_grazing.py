@@ -129,3 +129,21 @@ def test_a_path_between_corners_that_it_meets_at_once_is_held_by_all():
     mask = occupancy.obstacles_of(blocked)["mask"]
     problem = tp.Problem(FLAT, corners[0], corners[-1], (0, 0, 9, 9), mask)
     assert tp.refine(problem, moved).length == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize("distance", [1e-5, 1e-7, 1e-10])
+@pytest.mark.parametrize("sides", [2, 16, 3000])
+def test_a_path_that_touches_a_disc_almost_along_its_edge_becomes_tangents_and_an_arc(
+    sides, distance
+):
+    radius, half = 3.0, 10.0
+    problem = tp.Problem(FLAT, (0, 10), (20, 10), BOUNDS, [tp.Circle(10, 10, radius)])
+    angles = np.pi * (1.0 - (np.arange(sides) + 0.5) / sides)
+    reach = (radius + distance) / math.cos(0.5 * math.pi / sides)
+    arc = half + reach * np.column_stack([np.cos(angles), np.sin(angles)])
+    points = np.concatenate([[problem.start], arc, [problem.goal]])
+    turn = math.pi - 2.0 * math.acos(radius / half)
+    exact = 2.0 * math.sqrt(half**2 - radius**2) + radius * turn
+    refined = tp.refine(problem, points)
+    assert problem.allows(refined)
+    assert refined.length == pytest.approx(exact, rel=1e-6)

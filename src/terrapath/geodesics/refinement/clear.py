@@ -80,15 +80,16 @@ def _corners_cut(around: Surroundings, points: Array, cutting: Indices) -> tuple
     if len(cutting) == 0 or len(around.corners) == 0:
         return np.empty(0, np.int64), np.empty(0, np.int64)
     segments = shapely.linestrings(np.stack([points[cutting], points[cutting + 1]], axis=1))
-    tree = shapely.STRtree(shapely.points(around.corners))
-    which, corners = tree.query(segments, predicate="dwithin", distance=_reach(around))
+    # How far a corner may be from a segment that cuts it.
+    reaches = REACH_OF_CORNERS * around.clearance.max() + around.sags[around.discs[:-1]]
+    places = shapely.points(around.corners)
+    which, corners = shapely.STRtree(places).query(
+        segments, predicate="dwithin", distance=reaches.max()
+    )
+    near = shapely.dwithin(segments[which], places[corners], reaches[corners])
+    which, corners = which[near], corners[near]
     at = cutting[which]
     ahead = points[at + 1] - points[at]
     along = ((around.corners[corners] - points[at]) * ahead).sum(axis=1)
     order = np.lexsort((along, at))
     return at[order], corners[order]
-
-
-def _reach(around: Surroundings) -> float:
-    """How far a corner may be from a segment that cuts it, map units."""
-    return REACH_OF_CORNERS * float(around.clearance.max())

@@ -17,7 +17,7 @@ from .clear import is_clear, moved_clear
 from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
 from .curve import curve_through
 from .newton import correct, placed_parameters, settle
-from .walls import Surroundings, surroundings
+from .walls import FEWEST_SIDES, MOST_SIDES, Surroundings, surroundings
 
 # The distance between a path and what it touches, as a share of the region's side.
 CLEARANCE = 1e-8
@@ -28,9 +28,6 @@ CLEARANCE_ATTEMPTS = 4
 
 # Points that are nearer to one another than this, as a share of the region's side, are merged.
 REPEATED = 1e-10
-
-# Sides of the polygons that replace discs; they grow by a factor of four.
-FEWEST_SIDES, MOST_SIDES = 64, 4096
 
 # Pieces of the polyline for each feature of the surface, stage by stage.
 PIECES_PER_FEATURE = (2.0, 8.0)

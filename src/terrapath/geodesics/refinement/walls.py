@@ -27,6 +27,8 @@ SLACK = 0.01
 SHORTENED = 0.98
 # Free space itself widens the cells of masks; walls stand away from them by twice that, and more.
 CELL_MARGINS = 2.0
+# Sides of the polygons that replace discs; they grow by a factor of four.
+FEWEST_SIDES, MOST_SIDES = 64, 4096
 # A corner turns by more than this, radians.
 LEAST_TURN = 1e-9
 
@@ -60,7 +62,9 @@ class Surroundings:
     walls : for moving paths. space : the same walls, for testing segments. corners : (c, 2), where
     a path bends. clearance : (e,), of each wall. discs : (c + 1,), the disc that each corner
     belongs to, or -1; the last entry is -1, for the index NONE. wall_discs : (e + 1,), the same for
-    walls. sides : (discs,), of the polygon around each disc.
+    walls. sides : (discs,), of the polygon around each disc. sags : (discs + 1,), by how much that
+    polygon is wider than its disc where a path may pass between the two, which it only does where
+    there are as many sides as there may be; 0 elsewhere, and for the index NONE.
     """
 
     walls: kernels.Walls
@@ -70,11 +74,12 @@ class Surroundings:
     discs: Indices
     wall_discs: Indices
     sides: Indices
+    sags: Array
 
     @property
     def strips(self) -> Array:
         """(e,), the width of the strip between each wall and its obstacle, map units."""
-        return (1.0 - SLACK) * self.clearance
+        return np.asarray((1.0 - SLACK) * self.clearance + self.sags[self.wall_discs[:-1]])
 
 
 def _ring(points: Array, clearance: float) -> Outline:
@@ -201,7 +206,15 @@ def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surround
         np.repeat(owners, [len(plain.corners), *counts]),
         np.repeat(owners, [len(plain.edges), *counts]),
         sides,
+        _sags(space, sides),
     )
+
+
+def _sags(space: FreeSpace, sides: Indices) -> Array:
+    """(discs + 1,), as in ``Surroundings``."""
+    radii = np.array([*(circle.radius for circle in space.circles), 0.0])
+    wider = 1.0 / math.cos(math.pi / MOST_SIDES) - 1.0
+    return np.where(np.append(sides, 0) == MOST_SIDES, wider * radii, 0.0)
 
 
 def _indexed(bounds: Bounds, outline: Outline) -> tuple[kernels.Walls, grids.Space]:
