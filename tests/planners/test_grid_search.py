@@ -13,13 +13,16 @@ import numpy as np
 import pytest
 import shapely
 
+import occupancy
 import planner_oracles as oracles
 import terrapath as tp
+from common import mostly_slow
 from terrapath._kernels.planners import grid_search as kernels
-from terrapath.planners import grid_search, make_planner
+from terrapath.planners import base, grid_search, make_planner
 from terrapath.planners.rrt_star import FEATURES_PER_PANEL
 from terrapath.problem import scenes
-from terrapath.space.lattice import Lattice
+from terrapath.space.lattice import Cells, Lattice
+from terrapath.surface.bounds import Bounds
 
 NAMES = ("dijkstra", "a-star")
 EVERY = pytest.mark.parametrize("name", NAMES)
@@ -369,8 +372,8 @@ def test_a_straight_run_is_one_segment_only_where_that_is_proven_free(monkeypatc
     short = tp.AStar(spacing=0.5).solve(problem)
     assert len(short.path.points) < 8
     # In doubt, the path keeps every node.
-    refused = np.zeros(1, bool)
-    monkeypatch.setattr(tp.FreeSpace, "segments_are_free", lambda space, a, b: refused)
+    answers = iter([False, True])  # of the straight run, then of all nodes
+    monkeypatch.setattr(tp.Problem, "allows", lambda problem, points: next(answers))
     whole = tp.AStar(spacing=0.5).solve(problem)
     assert whole.cost == short.cost
     steps = np.hypot(*np.diff(whole.path.points, axis=0).T)
@@ -436,12 +439,13 @@ def test_a_start_in_a_pocket_without_a_node_nearby_sees_one_farther_off(name):
 
 @EVERY
 @pytest.mark.parametrize("swap", [False, True])
-def test_an_end_that_sees_no_node_is_a_result_that_says_so(name, swap):
+def test_an_end_that_sees_no_node_is_a_result_that_says_so(name, swap, monkeypatch):
     # A bent corridor: there is a way out, but no straight one.
     room = shapely.box(2.1, 2.1, 2.9, 2.9) - shapely.box(2.2, 2.2, 2.8, 2.8)
     room -= shapely.LineString([(2.75, 2.5), (2.85, 2.5), (2.85, 2.95)]).buffer(0.025)
     ends = [(2.3, 2.3), (9.0, 9.0)]
     problem = tp.Problem(FLAT, *(ends[::-1] if swap else ends), (0, 0, 10, 10), [room])
+    monkeypatch.setattr(base, "HALVINGS", 0)
     solution = tp.plan(problem, name, spacing=1.0)
     assert solution.status is tp.Status.NOT_FOUND
     assert solution.stopped_by == f"no node can be seen from the {'goal' if swap else 'start'}"
@@ -602,3 +606,52 @@ def test_more_nodes_than_can_be_numbered_are_refused(name, problem):
         tp.InputError, match=r"spacing=1e-06 makes .* nodes; give a wider one|wider"
     ):
         tp.plan(problem, name, spacing=1e-6)
+
+
+# Doors of one cell
+
+
+@EVERY
+@pytest.mark.parametrize("kind", occupancy.KINDS)
+@pytest.mark.parametrize("side", [11, *mostly_slow([260], quick=0)])
+def test_what_free_cells_join_is_found_as_a_mask_and_as_polygons(name, kind, side):
+    random = np.random.default_rng(side)
+    blocked = occupancy.grid_of(kind, random, side)
+    start, goal = np.array(occupancy.far_ends(blocked, random)) + 0.5
+    ground = shapely.union_all(occupancy.squares(blocked))
+    bounds = (0, 0, *blocked.shape[::-1])
+    for obstacles in occupancy.obstacles_of(blocked).values():
+        problem = tp.Problem(FLAT, start, goal, bounds, obstacles)
+        solution = tp.plan(problem, name, refine=True)
+        assert solution.status is tp.Status.SOLVED
+        for path in (solution.path, solution.unrefined):
+            assert path.line.disjoint(ground)
+
+
+@EVERY
+def test_a_finer_lattice_finds_what_the_first_one_misses(name):
+    walls = [shapely.box(4.2, -1, 4.4, 5.2), shapely.box(4.2, 5.4, 4.4, 11)]
+    problem = tp.Problem(FLAT, (1, 1), (9, 9), (0, 0, 10, 10), walls)
+    seen = []
+    solution = tp.plan(problem, name, spacing=1.0, callback=seen.append)
+    assert len({progress.total for progress in seen}) > 1
+    assert solution.path.line.disjoint(shapely.union_all(walls))
+
+
+@pytest.mark.parametrize("spacing", [0.2, 0.5, 1.0, 2.5])
+def test_nodes_lie_at_the_centres_of_cells(spacing):
+    cells = Cells(0.7, 100.25, 1.0, 0.5)
+    lattice = Lattice.at_cells(Bounds(0.0, 100.0, 20.0, 110.0), spacing, cells)
+    for nodes, centre, size, low, high in (
+        (lattice.x, 0.7, 1.0, 0.0, 20.0),
+        (lattice.y, 100.25, 0.5, 100.0, 110.0),
+    ):
+        step = nodes[1] - nodes[0]
+        assert step <= spacing + 1e-9
+        assert low <= nodes[0] < low + step
+        assert high - step < nodes[-1] <= high
+        places = (nodes - centre) / size
+        if step < size:  # every centre is a node
+            places = np.arange(math.ceil((low - centre) / size), (high - centre) // size)
+            places = (centre + size * places - nodes[0]) / step
+        np.testing.assert_allclose(places, np.round(places), atol=1e-9)

@@ -97,7 +97,7 @@ def test_heights_and_contours_of_a_further_layer_are_named():
 
 
 def test_other_routes_are_drawn_thinner_and_dashed_with_their_lengths(problem):
-    paths = [problem.path([(0, 0), (bow, 10 - bow), (10, 10)]) for bow in (3, 2, 6.5)]
+    paths = [problem.path([(0, 0), (bow, 10 - bow), (10, 10)]) for bow in (3, 2.8, 3.6)]
     solution = replace(
         tp.RRT().solve(problem), path=paths[0], alternatives=tuple(paths[1:]), tree=None
     )
@@ -358,7 +358,7 @@ def test_names_from_files_are_no_markup(solution, tmp_path):
 
 
 def test_next_best_routes_and_a_search_without_a_path_have_their_pages(solution, tmp_path):
-    bow = solution.problem.path([(0, 0), (2, 8), (10, 10)])
+    bow = solution.problem.path([(0, 0), (3, 7), (10, 10)])
     plot_page(replace(solution, alternatives=(bow,)), tmp_path / "page.html")
     drawn = traces_of(tmp_path / "page.html")[f"next best, {bow.length:.4f}"]
     assert decoded(drawn["x"]).tolist() == bow.profile.points[:, 0].tolist()

@@ -125,7 +125,10 @@ def mutated_tokens(text, generator):
 
 
 def straight_answer(run):
-    """In place of planning: the problem is made, its ends are checked, a line is drawn."""
+    """In place of planning: the problem is made, its ends are checked, a line is drawn.
+
+    Where that touches an obstacle the solution does not return it: exit code 3.
+    """
     problem = run._itinerary().problem
     solution = tp.Solution(
         problem=problem,
@@ -184,7 +187,7 @@ def answers_cleanly(file, content, capsys):
         signal.alarm(0)
         signal.signal(signal.SIGALRM, previous)
     captured = capsys.readouterr()
-    assert code in {0, 2}
+    assert code in {0, 2, 3}
     lines = captured.err.split("\n")[:-1]
     assert all(line.startswith("terrapath: ") for line in lines), captured.err
     assert "Traceback" not in captured.err
@@ -193,7 +196,7 @@ def answers_cleanly(file, content, capsys):
         assert lines, "nothing says what is wrong"
         assert len(lines[-1]) < 6000
     assert sorted(file.parent.iterdir()) == before
-    return code == 0
+    return code != 2
 
 
 @pytest.mark.parametrize("mutate", [mutated_bytes, mutated_tokens])

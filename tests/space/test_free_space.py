@@ -6,6 +6,7 @@ import shapely
 from hypothesis import given, settings, strategies as st
 from shapely import affinity
 
+import occupancy
 import terrapath as tp
 from common import FLAT
 from oracles import (
@@ -459,3 +460,50 @@ def test_a_problem_takes_one_obstacle_or_many_and_the_surfaces_bounds_by_default
         problem = tp.Problem(GRID, (0, 0), (10, 10), obstacles=obstacles)
         assert problem.bounds == GRID.bounds
         assert not problem.free_space.segments_are_free([[0, 0]], [[10, 5]]).any()
+
+
+# The same both ways, and sharp
+
+
+@given(
+    seed=seeds,
+    kind=st.sampled_from(occupancy.KINDS),
+    place=st.sampled_from([(0.0, 0.0, 1.0), (5e5, 4.2e6, 0.5), (-1.3e7, 8e6, 0.1)]),
+)
+@settings(deadline=None, max_examples=60)
+def test_a_segment_is_as_free_one_way_as_the_other_and_what_is_free_is_disjoint(seed, kind, place):
+    random = np.random.default_rng(seed)
+    *origin, size = place
+    blocked = occupancy.grid_of(kind, random, 9)
+    side = size * len(blocked)
+    bounds = Bounds(*origin, *(x + side for x in origin))
+    ends = random.integers(0, 2 * len(blocked) + 1, (200, 2, 2)) / 2.0  # corners and centres
+    near = random.normal(size=ends.shape) * 10.0 ** random.uniform(-16, -6, (200, 1, 1))
+    ends = ends + near * random.integers(0, 2, (200, 1, 1))
+    ends = np.clip(origin + size * ends, bounds[:2], bounds[2:])
+    ground = shapely.union_all(occupancy.squares(blocked, origin, size))
+    ends = ends[shapely.disjoint(ground, shapely.points(ends[:, 0]))]
+    disjoint = shapely.disjoint(ground, shapely.linestrings(ends))
+    for obstacles in occupancy.obstacles_of(blocked, origin, size).values():
+        space = tp.FreeSpace(bounds, obstacles)
+        there, back = (space.segments_are_free(ends[:, k], ends[:, 1 - k]) for k in (0, 1))
+        assert (there == back).all()
+        assert not (there & ~disjoint).any()
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (5e5, 4.2e6)])
+def test_cells_of_masks_are_sharp(x, y):
+    blocked = np.zeros((4, 4), bool)
+    blocked[1, 1] = blocked[2, 2] = True
+    mask = tp.Mask(blocked, x + np.arange(4.0), y + np.arange(4.0))
+    space = tp.FreeSpace(Bounds(x - 0.5, y - 0.5, x + 3.5, y + 3.5), [mask])
+    away = 1e-9 + 1e-15 * max(x, y)
+    passing = [(0.5 - away, 0.0, 0.5 - away, 1.5 - away)]  # beside a cell, up to the contact
+    blocking = [
+        (0.5, 0.0, 0.5, 1.4),  # along its side
+        (0.0, 1.0, 1.0, 0.0),  # through its corner
+        (1.0, 2.0, 2.0, 1.0),  # between two cells that touch at a corner
+    ]
+    segments = np.array([*passing, *blocking]) + np.array([x, y, x, y])
+    free = space.segments_are_free(segments[:, :2], segments[:, 2:])
+    assert free.tolist() == [True, False, False, False]

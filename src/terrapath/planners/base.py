@@ -21,6 +21,8 @@ INTERRUPT = "interrupt"
 # Where no path is found, the lattice may be too coarse to see a gap. Its spacing is halved this
 # many times.
 HALVINGS = 2
+# But never to more nodes than this.
+MOST_HALVED = 2**24
 
 # The stages of a run.
 SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bound"
@@ -200,11 +202,22 @@ def answer_without_search(
     return without_path(problem, planner, Status.UNREACHABLE, SEPARATED, seconds=seconds, seed=seed)
 
 
-def lattices(problem: Problem, spacing: float | None) -> Iterator[Lattice]:
+def lattices(
+    problem: Problem, spacing: float | None, *, at_cells: bool = False
+) -> Iterator[Lattice]:
     """A lattice to search for a path, then finer ones, for where it shows none.
 
-    spacing : of the nodes of the first, map units; by default the problem's.
+    spacing : of the nodes of the first, map units; by default the problem's. at_cells : by
+    default, nodes lie at the centres of the problem's cells; a lattice then need not reach the
+    edge of the bounds.
     """
-    first = spacing or problem.default_spacing
+    first, cells = spacing or problem.default_spacing, problem.cells
     for halvings in range(HALVINGS + 1):
-        yield Lattice.spanning(problem.bounds, first * 0.5**halvings)
+        step = first * 0.5**halvings
+        if at_cells and spacing is None and cells is not None:
+            lattice = Lattice.at_cells(problem.bounds, step, cells)
+        else:
+            lattice = Lattice.spanning(problem.bounds, step)
+        if halvings and lattice.nx * lattice.ny > MOST_HALVED:
+            return
+        yield lattice

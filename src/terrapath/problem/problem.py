@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from .._kernels.surface.surfaces import Spline
 from ..errors import BlockedError, InputError, OutsideSurfaceError
 from ..space.free_space import FreeSpace, Obstacle
-from ..space.lattice import default_spacing
-from ..surface import Surface, metric
+from ..space.lattice import Cells, default_spacing
+from ..surface import Mask, Surface, metric
 from ..surface.bounds import Bounds, as_bounds
 from ..validation import Point, PointLike, as_point, require_not_negative
 from .solution import Path
@@ -154,10 +155,28 @@ class Problem:
         """The path on this problem's surface through points (m, 2), map units."""
         return Path(self.surface, np.asarray(points, np.float64))
 
+    def allows(self, path: Path | npt.ArrayLike) -> bool:
+        """Does a path, given by its points (m, 2), stay in the bounds and touch no obstacle?
+
+        One of its points must be free. It is the same forwards and backwards.
+        """
+        points = path.points if isinstance(path, Path) else np.asarray(path, np.float64)
+        return self.free_space.allows(points)
+
     @property
     def default_spacing(self) -> float:
         """The default spacing of lattice nodes, map units."""
-        return default_spacing(self.bounds, self.surface.resolution)
+        finest = [self.surface.resolution, *(min(mask.spacing) for mask in self.free_space.masks)]
+        return default_spacing(self.bounds, min(finest))
+
+    @property
+    def cells(self) -> Cells | None:
+        """The smallest cells among those of masks and of the surface; None where there are none."""
+        grids = [_cells_of(mask) for mask in self.free_space.masks]
+        data = self.surface.data
+        if isinstance(data, Spline):
+            grids.append(Cells(data.x0, data.y0, data.dx, data.dy))
+        return min(grids, key=lambda cells: min(cells.dx, cells.dy), default=None)
 
     @cached_property
     def straight_length(self) -> float:
@@ -177,3 +196,7 @@ class Problem:
             known.get(key, "?") for key in ("start", "goal", "bounds", "surface")
         )
         return f"Problem({name}{start} to {goal} within {bounds}; {surface!r})"
+
+
+def _cells_of(mask: Mask) -> Cells:
+    return Cells(float(mask.x[0]), float(mask.y[0]), *mask.spacing)

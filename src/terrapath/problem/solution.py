@@ -138,6 +138,10 @@ _MESSAGES = {
 }
 
 
+# Why a path that was found is not returned.
+TOUCHES = "the path found touches an obstacle"
+
+
 class History(NamedTuple):
     """How the best cost fell during a search; an entry for each chunk of samples."""
 
@@ -200,6 +204,9 @@ class Solution:
     Lengths are in map units. ``path``, ``length`` and ``cost`` are None where no path was found.
     ``length`` is the true length of the path, whatever the planner minimised; ``cost`` is the
     planner's own measure of it. ``lower_bound`` is None where none was asked for.
+
+    Every path is tested as a whole when the solution is made. One that touches an obstacle or
+    leaves the bounds, if only by rounding, is led round the place, or left out.
     """
 
     problem: Problem  # as it was asked
@@ -221,6 +228,21 @@ class Solution:
     legs: tuple[Solution, ...] = ()  # of a tour, from each stop to the next
     options: dict[str, Any] = field(default_factory=dict)  # the planner's, as it was run
     corridor: PlannedPart | None = None  # the lower bound holds only in it; None for everywhere
+
+    def __post_init__(self) -> None:
+        unrefined, given = (_kept(self.problem, path) for path in (self.unrefined, self.path))
+        kept = [_kept(self.problem, path) for path in self.alternatives]
+        tested: dict[str, Any] = {
+            "path": given or unrefined,
+            "unrefined": unrefined,
+            "alternatives": tuple(path for path in kept if path is not None),
+        }
+        if self.path is not None and tested["path"] is None:
+            tested |= {"cost": None, "stopped_by": TOUCHES}
+            if self.status is Status.SOLVED:
+                tested["status"] = Status.NOT_FOUND
+        for name, value in tested.items():
+            object.__setattr__(self, name, value)
 
     @property
     def length(self) -> float | None:
@@ -267,3 +289,13 @@ class Solution:
             f"Solution({self.planner}: {self.status.value}, {length}, "
             f"{self.samples} samples, {self.seconds:.3f} s)"
         )
+
+
+def _kept(problem: Problem, path: Path | None) -> Path | None:
+    """The path where the problem allows it, or one beside it that is allowed, or None."""
+    if path is None or problem.allows(path.points):
+        return path
+    from .mending import mended
+
+    points = mended(problem.free_space, path.points)
+    return None if points is None else Path(path.surface, points)

@@ -252,6 +252,14 @@ class FreeSpace:
         kernels.fill_free(self.data, start, end, free)
         return free.astype(bool)
 
+    def allows(self, points: Array) -> bool:
+        """Does a path through points (m, 2), map units, stay in the bounds and touch nothing?
+
+        One of its points must be free. Whether it is read forwards or backwards does not matter.
+        """
+        inside = bool(self.bounds.contains(points).all())
+        return inside and bool(self.segments_are_free(points[:-1], points[1:]).all())
+
     def covered_cells(self, lattice: Lattice) -> npt.NDArray[np.bool_]:
         """(ny - 1, nx - 1), which cells of a lattice surely lie wholly inside one obstacle."""
         covered = np.zeros((lattice.ny - 1, lattice.nx - 1), bool)

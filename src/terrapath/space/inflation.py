@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..surface import Mask
 from ..surface.bounds import Bounds
 from ..validation import Array
-from .free_space import Circle, Geometries, Obstacle, are_points, sort_obstacles
+from .free_space import CELL_MARGIN, Circle, Geometries, Obstacle, are_points, sort_obstacles
 from .reachability import merged_masks
 
 # A quarter of a circle becomes this many edges. GEOS rounds their number along an arc, so an edge
@@ -38,8 +38,8 @@ GROWTH, ATTEMPTS = 0.002, 9
 MOST_JOINED = 300_000
 
 # A cell is blocked where it is nearer than the radius by at least this share of a cell. Free space
-# widens blocked cells by a hundred times that, so a path is never nearer than the radius.
-CELL_DOUBT = 1e-9
+# widens blocked cells by more than that, so a path is never nearer than the radius.
+CELL_DOUBT = 0.5 * CELL_MARGIN
 MOST_CELLS_AT_ONCE = 2**22
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,15 @@ NODES_PER_SIDE, MOST_NODES_PER_SIDE = 250.0, 1000.0
 
 # This many nodes can be numbered in 32 bits, and fit in the memory of a large machine.
 MOST_NODES = 2**30
+
+
+class Cells(NamedTuple):
+    """Cells of a map or a mask: the centre of one of them, and their size, map units."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
 
 
 def default_spacing(bounds: Bounds, resolution: float) -> float:
@@ -61,6 +71,22 @@ class Lattice:
             )
         return cls(bounds, nx, ny)
 
+    @classmethod
+    def at_cells(cls, bounds: Bounds, spacing: float, cells: Cells) -> Lattice:
+        """The lattice with nodes at the centres of cells, at most ``spacing`` map units apart.
+
+        Where cells are larger than the spacing there are nodes between the centres; where they are
+        smaller there is one at every few centres. The outermost nodes lie less than a step inside
+        the bounds. Where there is no room for two nodes on each axis, the lattice spans the bounds.
+        Raises as ``spanning`` does.
+        """
+        spanning = cls.spanning(bounds, spacing)
+        low_x, high_x, nx = _centres(bounds.x1_min, bounds.x1_max, spacing, cells.x, cells.dx)
+        low_y, high_y, ny = _centres(bounds.x2_min, bounds.x2_max, spacing, cells.y, cells.dy)
+        if min(nx, ny) < 2 or nx * ny > MOST_NODES:
+            return spanning
+        return cls(Bounds(low_x, low_y, high_x, high_y), nx, ny)
+
     @property
     def dx(self) -> float:
         """Distance of neighbouring nodes along x1, map units."""
@@ -90,3 +116,18 @@ class Lattice:
     def data(self) -> Grid:
         """The lattice for kernels: node (i, j) lies at (x0 + i dx, y0 + j dy)."""
         return Grid(self.bounds.x1_min, self.bounds.x2_min, self.dx, self.dy, self.nx, self.ny)
+
+
+def _centres(
+    low: float, high: float, spacing: float, centre: float, size: float
+) -> tuple[float, float, int]:
+    """The first and the last node of one axis, and how many there are."""
+    if size > spacing:
+        step = size / math.ceil(size / spacing - 1e-9)
+    else:
+        step = size * math.floor(spacing / size + 1e-9)
+    first = math.ceil((low - centre) / step - 1e-9)
+    last = math.floor((high - centre) / step + 1e-9)
+    # Rounding must not put a node outside the bounds.
+    ends = max(centre + first * step, low), min(centre + last * step, high)
+    return *ends, last - first + 1

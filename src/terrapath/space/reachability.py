@@ -19,7 +19,6 @@ from .._kernels.space import free_space as kernels
 from ..surface import Mask
 from ..surface.bounds import Bounds
 from ..validation import Array, Point
-from .free_space import cell_margin
 from .lattice import Lattice
 
 Cells: TypeAlias = npt.NDArray[np.bool_]
@@ -27,7 +26,7 @@ Indices: TypeAlias = npt.NDArray[np.intp]
 Lines: TypeAlias = npt.NDArray[np.object_]  # (m,) shapely.LineString
 
 # A strip of cells inside the bounds is left out where it is thinner than this share of the margin
-# by which kernels widen blocked cells: no path fits there.
+# that kernels add to blocked cells: no path fits there.
 SLIVER = 0.5
 
 # Walls that do not touch, but come nearer than this share of the largest coordinate, leave a doubt.
@@ -51,7 +50,8 @@ def separated(
     """
     if _are_free(space, np.array([a]), np.array([b])).all():
         return False
-    windows = [_Window.of(mask, bounds) for mask in merged_masks(masks)]
+    sliver = SLIVER * space.mask_frames[:, 4].min(initial=1.0)
+    windows = [_Window.of(mask, bounds, sliver) for mask in merged_masks(masks)]
     if any(window.separates(a, b) for window in windows):
         return True
     if len(walls) == 0 and len(windows) < 2:
@@ -119,8 +119,8 @@ class _Window:
     y: _Axis
 
     @classmethod
-    def of(cls, mask: Mask, bounds: Bounds) -> _Window:
-        (dx, dy), sliver = mask.spacing, SLIVER * cell_margin(mask, bounds)
+    def of(cls, mask: Mask, bounds: Bounds, sliver: float) -> _Window:
+        dx, dy = mask.spacing
         x = _Axis.of(mask.x, dx, bounds.x1_min, bounds.x1_max, sliver)
         y = _Axis.of(mask.y, dy, bounds.x2_min, bounds.x2_max, sliver)
         padded = np.pad(mask.blocked, 1)

@@ -23,6 +23,7 @@ class Walls(NamedTuple):
     edge_first: np.ndarray  # (cells + 1,) int64
     edge_ids: np.ndarray  # int64
     corners: np.ndarray  # (c, 2) float64
+    outwards: np.ndarray  # (c, 2) float64: from each corner to where a path is held by it
     corner_first: np.ndarray
     corner_ids: np.ndarray
 
@@ -59,6 +60,24 @@ def corner_time(ax, ay, ux, uy, bx, by, vx, vy, cx, cy):
             return max(t, 0.0)
         t = first_root(q0, q1, q2, t)
     return math.inf
+
+
+@kernel
+def is_passed(ax, ay, ux, uy, bx, by, vx, vy, cx, cy, ox, oy):
+    """Does the moving segment a-b already lie a little behind the corner c, and go on from there?
+
+    Rounding puts it there where a path meets several corners at once. (ox, oy) points outwards,
+    and how far a segment may be behind is measured by it.
+    """
+    ex, ey, wx, wy = bx - ax, by - ay, cx - ax, cy - ay
+    outside, behind = ex * oy - ey * ox, ex * wy - ey * wx
+    if behind * outside < 0.0 or behind * behind > 4.0 * (ox * ox + oy * oy) * (ex * ex + ey * ey):
+        return False
+    along = wx * ex + wy * ey
+    if along < 0.0 or along > ex * ex + ey * ey:
+        return False
+    change = (vx - ux) * wy - (vy - uy) * wx - ex * uy + ey * ux
+    return change * outside > 0.0
 
 
 @kernel
@@ -110,10 +129,51 @@ def first_corner(walls, ax, ay, ux, uy, bx, by, vx, vy, skipped, also_skipped):
                 if c in (skipped, also_skipped) or not low_x <= cx <= high_x:
                     continue
                 if low_y <= cy <= high_y:
+                    ox, oy = walls.outwards[c, 0], walls.outwards[c, 1]
+                    if is_passed(ax, ay, ux, uy, bx, by, vx, vy, cx, cy, ox, oy):
+                        return 0.0, c
                     t = corner_time(ax, ay, ux, uy, bx, by, vx, vy, cx, cy)
                     if t < best:
                         best, hit = t, c
     return best, hit
+
+
+@kernel
+def strip_depth(walls, e, x, y):
+    """How far behind a wall a point is; infinite for a point in front of it or beside it."""
+    ax, ay, bx, by = walls.edges[e, 0], walls.edges[e, 1], walls.edges[e, 2], walls.edges[e, 3]
+    depth = walls.normals[e, 0] * (ax - x) + walls.normals[e, 1] * (ay - y)
+    ahead_x, ahead_y = bx - ax, by - ay
+    along = (x - ax) * ahead_x + (y - ay) * ahead_y
+    beside = along < 0.0 or along > ahead_x * ahead_x + ahead_y * ahead_y
+    return math.inf if beside or depth <= 0.0 else depth
+
+
+@kernel
+def wall_before(walls, strips, widest, x, y):
+    """The wall in whose strip a point is least deep, and how deep; -1 for none."""
+    grid, least, hit = walls.grid, math.inf, -1
+    rows = span(y - widest, y + widest, grid.y0, grid.dy, grid.ny, INDEX_MARGIN)
+    columns = span(x - widest, x + widest, grid.x0, grid.dx, grid.nx, INDEX_MARGIN)
+    for row in range(rows.first, rows.last + 1):
+        for column in range(columns.first, columns.last + 1):
+            cell = row * grid.nx + column
+            for k in range(walls.edge_first[cell], walls.edge_first[cell + 1]):
+                e = walls.edge_ids[k]
+                depth = strip_depth(walls, e, x, y)
+                if depth < strips[e] and depth < least:
+                    least, hit = depth, e
+    return least, hit
+
+
+@kernel
+def fill_strips(walls, strips, widest, points, hits, depths):
+    """The wall in whose strip each point is: hits (m,), -1 for none, and depths (m,).
+
+    strips (e,) : the width of the strip behind each wall, up to its obstacle. widest : of them.
+    """
+    for m in range(points.shape[0]):
+        depths[m], hits[m] = wall_before(walls, strips, widest, points[m, 0], points[m, 1])
 
 
 @kernel

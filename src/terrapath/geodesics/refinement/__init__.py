@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import InputError
+from ...errors import InputError, UnfinishedWarning, tell
 from ...problem import Path, Problem
 from ...surface import Surface
 from ...validation import Array, as_array, require_positive
@@ -31,6 +31,8 @@ SAME_PLACE = 1e-9
 # The path found may be longer than the one given by this share, which allows for rounding.
 ROUNDING = 1e-12
 
+NO_ROOM = "a path could not be refined: obstacles leave no room to pull it taut; it stays as it was"
+
 
 def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = TOLERANCE) -> Path:
     """The locally shortest path near a path: what it becomes when it is pulled taut.
@@ -38,20 +40,25 @@ def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = T
     path : Path or (m, 2) array, map units, from the problem's start to its goal through free
     space; any planner's will do. tolerance : by which the path returned may be longer than the
     exact geodesic, relative. It holds where the path touches nothing, and as long as 8,192 points
-    are enough. The path bends round obstacles, and the edge of the bounds, at a distance of 1e-8
-    of the region's side. It is never longer than the path given, stays in free space, and passes
-    each obstacle on the same side.
+    are enough. The path bends round obstacles at a distance of 1e-8 of the region's side, however
+    near to them the path given passes. It is never longer than the path given, stays in free
+    space, and passes each obstacle on the same side. Where obstacles leave no room to pull the
+    path taut, it is returned as it was, with an UnfinishedWarning.
     Raises InputError where the path does not join start and goal, or is not in free space.
     """
     require_positive(tolerance=tolerance)
     given = problem.path(_checked(problem, path))
-    best = given
+    best, is_pulled = given, given.length == 0.0
     for points in _refined(problem, given, tolerance):
-        found = problem.path(points)
+        if not problem.allows(points):
+            continue
+        found, is_pulled = problem.path(points), True
         # Of two that are equally long, the later one has fewer points.
         longest = min(best.length * (1.0 + tolerance), given.length * (1.0 + ROUNDING))
-        if _is_allowed(problem, points) and found.length <= longest:
+        if found.length <= longest:
             best = found
+    if not is_pulled:
+        tell(UnfinishedWarning(NO_ROOM))
     return best
 
 
@@ -101,12 +108,6 @@ def _require_free(problem: Problem, points: Array) -> None:
             f"the path's segment ({ax:.10g}, {ay:.10g}) to ({bx:.10g}, {by:.10g}) touches an "
             "obstacle; refine a path through free space"
         )
-
-
-def _is_allowed(problem: Problem, points: Array) -> bool:
-    """Does the polyline stay within the bounds and in free space?"""
-    inside = problem.bounds.contains(points).all()
-    return bool(inside and problem.free_space.segments_are_free(points[:-1], points[1:]).all())
 
 
 def _refined(problem: Problem, given: Path, tolerance: float) -> Iterator[Array]:

@@ -9,26 +9,25 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from ..._kernels.space import free_space as grids
 from ...problem import Problem
 from ...space.free_space import Circle, FreeSpace, Indices
 from ...surface import Surface
 from ...validation import Array
+from .clear import is_clear, moved_clear
 from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
 from .curve import curve_through
 from .newton import correct, placed_parameters, settle
-from .walls import Surroundings, surroundings
+from .walls import FEWEST_SIDES, MOST_SIDES, Surroundings, surroundings
 
 # The distance between a path and what it touches, as a share of the region's side.
 CLEARANCE = 1e-8
-# Where the path given is nearer to an obstacle, a tenth of the clearance is tried, and so on.
+# And at least this share of the largest coordinate, so that it is far above rounding.
+LEAST_CLEARANCE = 2.0**-46
+# Where obstacles leave no room for that, a tenth of the clearance is tried, and so on.
 CLEARANCE_ATTEMPTS = 4
 
 # Points that are nearer to one another than this, as a share of the region's side, are merged.
 REPEATED = 1e-10
-
-# Sides of the polygons that replace discs; they grow by a factor of four.
-FEWEST_SIDES, MOST_SIDES = 64, 4096
 
 # Pieces of the polyline for each feature of the surface, stage by stage.
 PIECES_PER_FEATURE = (2.0, 8.0)
@@ -42,9 +41,10 @@ SMOOTHING_ROUNDS = 10
 def taut_paths(problem: Problem, points: Array, tolerance: float) -> Iterator[Array]:
     """Polylines (m, 2) from the one given towards the taut path; each is closer to it."""
     surface, space = problem.surface, problem.free_space
-    around = _around(space, points)
-    if around is None:
+    cleared = _cleared(space, points)
+    if cleared is None:
         return
+    around, points = cleared
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
     band = Band.free(points)
     for pieces in PIECES_PER_FEATURE:
@@ -67,23 +67,40 @@ def _tidied(problem: Problem, points: Array) -> Array:
     kept = np.concatenate([points[:1], points[1:-1][apart[:-1]], points[-1:]])
     x0, y0, x1, y1 = problem.bounds
     inside = np.clip(kept, (x0, y0), (x1, y1))
-    inside[[0, -1]] = problem.start, problem.goal
-    return np.asarray(inside)
+    return _with_ends(problem, inside)
+
+
+def _with_ends(problem: Problem, points: Array) -> Array:
+    """The path from the very start to the very goal, which may graze an obstacle.
+
+    Where a segment to an end is not free, the point that the end was moved to is kept.
+    """
+    ends = np.array([[problem.start], [problem.goal]])
+    joined = np.concatenate([ends[0], points[1:-1], ends[1]])
+    free = problem.free_space.segments_are_free(joined[[0, -2]], joined[[1, -1]])
+    first = points[:1] if not free[0] else points[:0]
+    last = points[-1:] if not free[1] else points[:0]
+    return np.concatenate([ends[0], first, points[1:-1], last, ends[1]])
 
 
 # Discs
 
 
-def _around(space: FreeSpace, points: Array) -> Surroundings | None:
-    """The surroundings of a path, with the largest clearance that the path keeps."""
+def _cleared(space: FreeSpace, points: Array) -> tuple[Surroundings, Array] | None:
+    """The surroundings of a path, and the path moved clear of what it grazes.
+
+    The clearance is the largest one that the path keeps or can be moved to keep; None where even
+    the smallest one leaves no room.
+    """
+    largest = float(np.abs(space.bounds).max())
+    widest = max(CLEARANCE * space.bounds.side, LEAST_CLEARANCE * largest)
     for attempt in range(CLEARANCE_ATTEMPTS):
-        clearance = CLEARANCE * space.bounds.side * 0.1**attempt
+        clearance = widest * 0.1**attempt
         sides = np.array([_sides_clear_of(points, c, clearance) for c in space.circles], int)
         around = surroundings(space, clearance, sides)
-        free = np.empty(len(points) - 1, np.uint8)
-        grids.fill_free(around.space, points[:-1], points[1:], free)
-        if free.all():
-            return around
+        cleared = points if is_clear(around, points) else moved_clear(space, around, points)
+        if cleared is not None:
+            return around, cleared
     return None
 
 

@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..._kernels.geodesics import contacts as kernels
 from ..._kernels.space import free_space as grids
-from ...space.free_space import FreeSpace, Indices, index_grid, listed
+from ...space.free_space import FreeSpace, Indices, cell_margin, index_grid, listed
 from ...surface import Mask
 from ...surface.bounds import Bounds
 from ...validation import Array
@@ -25,8 +25,10 @@ from ...validation import Array
 SLACK = 0.01
 # At a corner walls are extended by this share of what would make them meet.
 SHORTENED = 0.98
-# Free space itself widens the cells of masks; this share of a cell is a little more than that.
-CELL_CLEARANCE = 3e-7
+# Free space itself widens the cells of masks; walls stand away from them by twice that, and more.
+CELL_MARGINS = 2.0
+# Sides of the polygons that replace discs; they grow by a factor of four.
+FEWEST_SIDES, MOST_SIDES = 64, 4096
 # A corner turns by more than this, radians.
 LEAST_TURN = 1e-9
 
@@ -60,7 +62,9 @@ class Surroundings:
     walls : for moving paths. space : the same walls, for testing segments. corners : (c, 2), where
     a path bends. clearance : (e,), of each wall. discs : (c + 1,), the disc that each corner
     belongs to, or -1; the last entry is -1, for the index NONE. wall_discs : (e + 1,), the same for
-    walls. sides : (discs,), of the polygon around each disc.
+    walls. sides : (discs,), of the polygon around each disc. sags : (discs + 1,), by how much that
+    polygon is wider than its disc where a path may pass between the two, which it only does where
+    there are as many sides as there may be; 0 elsewhere, and for the index NONE.
     """
 
     walls: kernels.Walls
@@ -70,6 +74,12 @@ class Surroundings:
     discs: Indices
     wall_discs: Indices
     sides: Indices
+    sags: Array
+
+    @property
+    def strips(self) -> Array:
+        """(e,), the width of the strip between each wall and its obstacle, map units."""
+        return np.asarray((1.0 - SLACK) * self.clearance + self.sags[self.wall_discs[:-1]])
 
 
 def _ring(points: Array, clearance: float) -> Outline:
@@ -128,7 +138,6 @@ def _disc(x: float, y: float, radius: float, sides: int) -> Array:
 def _mask(mask: Mask, clearance: float) -> Outline:
     """The outline of a mask's blocked cells."""
     dx, dy = mask.spacing
-    clearance += CELL_CLEARANCE * max(dx, dy)
     blocked = np.pad(mask.blocked, 1)
     node_x = mask.x[0] - 0.5 * dx + dx * np.arange(mask.blocked.shape[1] + 1)
     node_y = mask.y[0] - 0.5 * dy + dy * np.arange(mask.blocked.shape[0] + 1)
@@ -181,7 +190,9 @@ def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surround
     parts = [_bounds(space.bounds, clearance)]
     for geometry in space.geometries:
         parts += [_ring(ring, clearance) for ring in _rings(geometry)]
-    parts += [_mask(mask, clearance) for mask in space.masks]
+    for mask in space.masks:
+        widened = CELL_MARGINS * cell_margin(mask, space.bounds) * max(mask.spacing)
+        parts.append(_mask(mask, clearance + widened))
     plain = Outline.joined(parts)
     for circle, count in zip(space.circles, sides, strict=True):
         ring = _disc(circle.x1, circle.x2, circle.radius, int(count))
@@ -195,7 +206,15 @@ def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surround
         np.repeat(owners, [len(plain.corners), *counts]),
         np.repeat(owners, [len(plain.edges), *counts]),
         sides,
+        _sags(space, sides),
     )
+
+
+def _sags(space: FreeSpace, sides: Indices) -> Array:
+    """(discs + 1,), as in ``Surroundings``."""
+    radii = np.array([*(circle.radius for circle in space.circles), 0.0])
+    wider = 1.0 / math.cos(math.pi / MOST_SIDES) - 1.0
+    return np.where(np.append(sides, 0) == MOST_SIDES, wider * radii, 0.0)
 
 
 def _indexed(bounds: Bounds, outline: Outline) -> tuple[kernels.Walls, grids.Space]:
@@ -206,8 +225,9 @@ def _indexed(bounds: Bounds, outline: Outline) -> tuple[kernels.Walls, grids.Spa
     edge_first, edge_ids = listed(grids.list_edges, grid, edges)
     corner_first, corner_ids = listed(grids.list_edges, grid, np.hstack([tips, tips]))
     normals = np.ascontiguousarray(outline.normals)
+    outwards = outline.corners - outline.tips
     walls = kernels.Walls(
-        grid, edges, normals, edge_first, edge_ids, tips, corner_first, corner_ids
+        grid, edges, normals, edge_first, edge_ids, tips, outwards, corner_first, corner_ids
     )
     space = grids.Space(
         grid,
