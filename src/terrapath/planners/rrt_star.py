@@ -12,6 +12,7 @@ import numpy as np
 
 from .._kernels.planners import rrt_star as kernels, tree as trees
 from .._kernels.planners.buckets import Buckets
+from .._kernels.planners.sampling import PATH_SHARE
 from ..problem import History, Path, Problem, SearchTree, Solution
 from ..surface import Surface
 from ..validation import (
@@ -24,6 +25,7 @@ from ..validation import (
     require_seed,
 )
 from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit, status_of
+from .first_path import FirstPath, first_path
 
 # Samples between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 512
@@ -83,8 +85,23 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     )
 
 
-def _allocate(samples: int, surface: Surface) -> trees.Tree:
-    size = samples + 2  # the start, and the goal that may join with the last sample
+def _pieces(path: Path | None, step: float) -> Array:
+    """The points (m, 2) of a path, cut into edges of at most a step; none without a path."""
+    if path is None:
+        return np.empty((0, 2))
+    moves = np.diff(path.points, axis=0)
+    counts = np.maximum(np.ceil(np.hypot(*moves.T) / step - 1e-9), 1.0).astype(np.intp)
+    pieces = [
+        start + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * move
+        for start, move, count in zip(path.points, moves, counts, strict=False)
+    ]
+    return np.concatenate([*pieces, path.points[-1:]])
+
+
+def _allocate(samples: int, surface: Surface, branch: Array | None = None) -> trees.Tree:
+    branch = np.empty((0, 2)) if branch is None else branch
+    # The start, the first branch, and the goal that may join with the last sample.
+    size = samples + 2 + len(branch)
     most = size // 2 + 64  # buckets
     return trees.Tree(
         places=np.empty((size, trees.LIFTED + len(surface.layers))),
@@ -99,6 +116,7 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
             shape=np.zeros(2, np.int64),
         ),
         floor=surface.least_cost,
+        branch=branch,
         near=np.empty(size, trees.CANDIDATE),
         queue=np.empty(size, np.int32),
     )
@@ -106,18 +124,19 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
 
 @dataclass
 class _Search:
-    """A running search: the tree, the clock and the history."""
+    """A running search: the tree, what it began with, the clock and the history."""
 
     problem: Problem
     options: TreeOptions
     settings: trees.Options
     tree: trees.Tree
+    first: FirstPath
     started: float = field(default_factory=time.perf_counter)
     rows: list[tuple[int, float, float]] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
-        return time.perf_counter() - self.started
+        return time.perf_counter() - self.started + self.first.seconds
 
     @property
     def goal(self) -> int:
@@ -164,17 +183,21 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
     return ""
 
 
-def _side_by_side(draws: Array) -> Array:
+def _side_by_side(draws: Array, informed: bool) -> Array:
     """Sort draws (m, 3) so that each one lies near the one before.
 
-    Their last two numbers are a point in a square; the order is row by row, to and fro.
+    Their last two numbers are a point in a square; the order is row by row, to and fro. Before
+    them come those beside the path of an informed tree, in their order along it.
     """
     row = np.floor(draws[:, 2] * math.isqrt(len(draws)))
     column = np.where(row % 2 == 0, draws[:, 1], 1.0 - draws[:, 1])
-    return draws[np.argsort(row + column)]
+    order = row + column
+    if informed:
+        order = np.where(draws[:, 0] < PATH_SHARE, draws[:, 1] - 1.0, order)
+    return draws[np.argsort(order)]
 
 
-def _chunks(seed: int, samples: int) -> Iterator[Array]:
+def _chunks(seed: int, samples: int, informed: bool = False) -> Iterator[Array]:
     """The uniform numbers (m, 3) that samples are drawn with, chunk by chunk.
 
     They are drawn in batches; each is a quarter of all those before. Within a batch the order is
@@ -191,14 +214,17 @@ def _chunks(seed: int, samples: int) -> Iterator[Array]:
         drawn += len(batch)
         if drawn >= samples:
             return
-        batch = _side_by_side(random.random((drawn // 4, 3)))
+        batch = _side_by_side(random.random((drawn // 4, 3)), informed)
 
 
 def _run(search: _Search, callback: Callback | None) -> str:
     """Grow the tree until there is a reason to stop, and return it."""
-    reason = ""
+    options, reason = search.options, search.first.stopped_by
+    if reason:
+        search.note()
+        return reason
     try:
-        for draws in _chunks(search.options.seed, search.options.samples):
+        for draws in _chunks(options.seed, options.samples, options.informed):
             search.grow(draws)
             if reason := _reason_to_stop(search, callback):
                 break
@@ -209,6 +235,7 @@ def _run(search: _Search, callback: Callback | None) -> str:
 
 
 def _path(problem: Problem, tree: trees.Tree) -> Path | None:
+    """The tree's path to the goal."""
     vertex = int(tree.counters[trees.GOAL])
     if vertex < 0:
         return None
@@ -217,6 +244,27 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
         visited.append(vertex)
         vertex = int(parents[vertex])
     return problem.path(tree.places[visited[::-1], : trees.COST])
+
+
+def _first_path(problem: Problem, options: TreeOptions, callback: Callback | None) -> FirstPath:
+    """What an informed tree begins with; other trees begin with nothing."""
+    if not options.informed:
+        return FirstPath(None)
+    return first_path(problem, callback, options.samples, options.time_limit)
+
+
+def _best(search: _Search) -> tuple[Path | None, float | None]:
+    """The shorter of the tree's path and the one that it began with, and its cost.
+
+    Lengths are true, because what a tree believes of its edges is an estimate. A tree that
+    measures chords minimises something else, so its own path counts where it has one.
+    """
+    path, first = _path(search.problem, search.tree), search.first.path
+    if first is not None and (
+        path is None or (search.options.riemannian and first.length < path.length)
+    ):
+        return first, first.length
+    return path, None if path is None else search.best_cost
 
 
 def _search_tree(tree: trees.Tree) -> SearchTree:
@@ -247,19 +295,20 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     answer = answer_without_search(problem, options.planner, options.seed)
     if answer is not None:
         return answer
-    tree = _allocate(options.samples, problem.surface)
     settings = _kernel_options(problem, options)
+    first = _first_path(problem, options, callback)
+    tree = _allocate(options.samples, problem.surface, _pieces(first.path, settings.step))
     _prepare(problem, tree, settings)
-    search = _Search(problem, options, settings, tree)
+    search = _Search(problem, options, settings, tree, first)
     stopped_by = _run(search, callback)
     seconds = search.seconds
-    path = _path(problem, tree)
+    path, cost = _best(search)
     return Solution(
         problem=problem,
         planner=options.planner,
         status=status_of(path, stopped_by),
         path=path,
-        cost=None if path is None else search.best_cost,
+        cost=cost,
         seconds=seconds,
         samples=search.samples,
         seed=options.seed,
@@ -281,10 +330,12 @@ class RRTStar:
     seed : of the random generator; the same seed gives the same tree, to the last bit.
     radius_factor : the search radius, as a multiple of the least one that optimality needs.
     goal_bias : share of samples that are the goal, until it is reached.
-    informed : begin with the straight line to the goal. Then leave out samples that cannot
-        improve the best path, by their chords (Gammell et al. 2014), and draw 0.3 of them near
-        it (Akgun and Stilman 2011). Hang vertices below their parents' parents where that is
-        shorter (Jeong et al. 2019). With ``False`` all of the region is sampled, as in the paper.
+    informed : begin with the straight line to the goal, or where that is blocked or dear with a
+        path over a coarse lattice. Then leave out samples that cannot improve the best path, by
+        their chords (Gammell et al. 2014), and draw 0.3 of them near it (Akgun and Stilman 2011);
+        where the tree is crowded these are left out. Hang vertices below their parents' parents
+        where that is shorter (Jeong et al. 2019). With ``False`` all of the region is sampled, as
+        in the paper.
     prune : do not measure edges whose chord is already too long; the tree stays the same.
     panel : longest piece of an edge that one application of Line-R measures, map units; by
         default as long as the surface's features allow; ``math.inf`` is exactly Algorithm 1.

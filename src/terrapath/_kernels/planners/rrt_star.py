@@ -4,8 +4,8 @@ What the paper leaves open, and what is done here: Algorithm 3 as printed never 
 Cost(v_new) after it changes v_min; the update is clearly meant, and is made here. The goal joins
 the tree as a vertex as soon as one extension can reach it, and is then rewired like any other
 vertex. The length of an edge is max(Line-R, chord): both estimate its true length, and the chord
-is never above it. An informed tree tries the straight line to the goal first. Where that is
-shorter, it joins a new vertex to its parent's parent.
+is never above it. An informed tree begins with a path, its first branch. Where that is shorter, it
+joins a new vertex to its parent's parent.
 """
 
 import math
@@ -13,7 +13,7 @@ import math
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
 from .buckets import lay_out, nearest, put, resize, squared_distance, within
-from .sampling import distance_to_goal, near_radius, sample
+from .sampling import distance_to_goal, is_beside_path, near_radius, sample
 from .tree import (
     CHECKED,
     CONSIDERED,
@@ -24,7 +24,6 @@ from .tree import (
     PRUNED,
     REWIRED,
     SAMPLES,
-    STRAIGHT,
     VERTICES,
     X,
     Y,
@@ -247,14 +246,23 @@ def refresh_buckets(tree, options, radius):
         tree.counters[LAID_OUT] = count
 
 
+# A sample beside the best path is left out where more than this many times log n of the tree's n
+# vertices are within the near radius. Uniform samples alone make 13.5 log n with the default
+# radius. So what a sample costs stays O(log n), and no uniform sample is ever left out.
+CROWD = 60.0
+
+
 @kernel
-def extend(surface, space, tree, options, x, y):
-    """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew."""
+def extend(surface, space, tree, options, x, y, is_beside):
+    """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew.
+
+    is_beside : the sample is one of those beside the best path, which a crowd leaves out.
+    """
     new = tree.counters[VERTICES]
     radius = near_radius(tree, options)
     refresh_buckets(tree, options, radius)
     x, y, count, closest = find_near(tree, options, radius, x, y)
-    if tree.near[closest].squared == 0.0:
+    if tree.near[closest].squared == 0.0 or (is_beside and count > CROWD * math.log(new)):
         return False
     place(surface, tree, new, x, y)
     promising = measure_chords(tree, new, count)
@@ -276,25 +284,48 @@ def join_goal(surface, space, tree, options):
     """Make the goal a vertex where the newest vertex is at most one step away from it."""
     newest = tree.counters[VERTICES] - 1
     if 0.0 < distance_to_goal(tree, options, newest) <= options.step:
-        extend(surface, space, tree, options, options.goal_x, options.goal_y)
+        extend(surface, space, tree, options, options.goal_x, options.goal_y, False)
         newest = tree.counters[VERTICES] - 1
     if distance_to_goal(tree, options, newest) == 0.0:
         tree.counters[GOAL] = newest
 
 
 @kernel
+def hang_branch(surface, space, tree, options):
+    """Make the points of the first branch vertices, each the child of the one before.
+
+    It ends before an edge that is not free, or has no length in floating point.
+    """
+    for m in range(1, tree.branch.shape[0]):
+        new = tree.counters[VERTICES]
+        place(surface, tree, new, tree.branch[m, 0], tree.branch[m, 1])
+        candidate, p = tree.near[0], tree.places[new]
+        candidate.vertex = new - 1
+        candidate.squared = squared_distance(tree.places, new - 1, p[X], p[Y])
+        measure_chord(tree, new, 0)
+        length = candidate_length(surface, tree, options, new, 0)
+        if not (length < math.inf and candidate_is_free(space, tree, new, 0)):
+            return
+        adopt(tree, new - 1, new, length)
+        tree.counters[CONSIDERED] += 1
+        tree.counters[VERTICES] = new + 1
+        if distance_to_goal(tree, options, new) == 0.0:
+            tree.counters[GOAL] = new
+
+
+@kernel
 def grow(surface, space, tree, options, draws):
     """Algorithm 2: draw len(draws) samples. draws (m, 3): uniform numbers in [0, 1).
 
-    The first call makes the start the tree's first vertex.
+    The first call makes the start the tree's first vertex, and hangs the first branch below it.
     """
     if tree.counters[VERTICES] == 0:
         plant(surface, tree, options)
+        hang_branch(surface, space, tree, options)
     for m in range(draws.shape[0]):
         tree.counters[SAMPLES] += 1
         x, y, worthwhile = sample(surface, tree, options, draws[m])
-        grew = worthwhile and extend(surface, space, tree, options, x, y)
-        if not grew:
-            tree.counters[STRAIGHT] = 0
-        elif tree.counters[GOAL] < 0:
+        is_beside = is_beside_path(tree, options, draws[m])
+        grew = worthwhile and extend(surface, space, tree, options, x, y, is_beside)
+        if grew and tree.counters[GOAL] < 0:
             join_goal(surface, space, tree, options)

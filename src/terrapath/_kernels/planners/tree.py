@@ -21,8 +21,7 @@ INTEGRATED = 5  # edges measured by Line-R
 CHECKED = 6  # edges tested against obstacles
 REWIRED = 7  # edges replaced by a better one
 LAID_OUT = 8  # vertices when they were last sorted into the buckets
-STRAIGHT = 9  # 1 as long as the tree is growing straight from the start to the goal
-COUNTERS = 10
+COUNTERS = 9
 
 
 # Entries of a row of Tree.places: what the search for neighbours reads of a vertex.
@@ -65,6 +64,7 @@ class Tree(NamedTuple):
     counters: np.ndarray  # (COUNTERS,) int64, 0 before the tree is planted
     buckets: Buckets
     floor: float  # no cost of the surface is below it
+    branch: np.ndarray  # (m, 2) float64: the first branch, from start to goal; m = 0 for none
     near: np.ndarray  # (n,) CANDIDATE: workspace
     queue: np.ndarray  # (n,) int32: workspace
 
@@ -155,7 +155,6 @@ def plant(surface, tree, options):
     tree.buckets.frame[1] = options.y0
     tree.counters[GOAL] = -1
     tree.counters[VERTICES] = 1
-    tree.counters[STRAIGHT] = options.informed
 
 
 @kernel

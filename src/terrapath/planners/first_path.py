@@ -1,0 +1,93 @@
+"""The path that an informed tree begins with: the straight line, or one over a coarse lattice."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..problem import Path, Problem
+from ..surface.metric import chord
+from .base import INTERRUPT, Callback, Progress
+
+# A straight line that is longer than this many chords is dear: a way around is looked for.
+DEAR = 1.05
+
+# A lattice has no more nodes than these at first, so that it costs no more than the default
+# number of samples; among obstacles at least so many on a side, to see the gaps.
+MOST_NODES, NODES_AMONG_OBSTACLES = 40_000, 100
+
+# The neighbours of a node. With eight, paths would be up to 8 % longer than needed.
+NEIGHBOURS = 16
+
+# What ends a search for a path before it is done.
+ENDED_EARLY = (INTERRUPT, "callback", "time limit")
+
+
+class FirstPath(NamedTuple):
+    """What a tree begins with."""
+
+    path: Path | None  # None where the lattices show none
+    seconds: float = 0.0  # it took, without compiling
+    stopped_by: str = ""  # what ended the search for it early
+
+
+def first_path(
+    problem: Problem, callback: Callback | None, samples: int, time_limit: float | None
+) -> FirstPath:
+    """The straight line where it is free and cheap, else the shorter of it and a lattice's path.
+
+    samples : how many the tree may draw, for the progress. time_limit : seconds.
+    """
+    started = time.perf_counter()
+    straight = _straight(problem)
+    if straight is not None and _is_cheap(problem):
+        return FirstPath(straight, time.perf_counter() - started)
+    found = _over_lattices(problem, callback, samples, time_limit)
+    paths = [path for path in (found.path, straight) if path is not None]
+    return found._replace(path=min(paths, key=lambda path: path.length, default=None))
+
+
+def _straight(problem: Problem) -> Path | None:
+    ends = [problem.start], [problem.goal]
+    if not problem.free_space.segments_are_free(*ends).all():
+        return None
+    return problem.path([problem.start, problem.goal])
+
+
+def _is_cheap(problem: Problem) -> bool:
+    least = float(chord(problem.surface, problem.start, problem.goal))
+    return problem.straight_length <= DEAR * least
+
+
+def coarse_spacing(problem: Problem) -> float:
+    """The spacing of the first lattice, map units: as fine as the features, or as is cheap."""
+    side, free_space = problem.bounds.side, problem.free_space
+    wanted = problem.surface.resolution
+    if free_space.has_obstacles:
+        cells = (min(mask.spacing) for mask in free_space.masks)
+        wanted = min(wanted, side / NODES_AMONG_OBSTACLES, *cells)
+    return max(min(wanted, 0.1 * side), side / math.sqrt(MOST_NODES))
+
+
+def _over_lattices(
+    problem: Problem, callback: Callback | None, samples: int, time_limit: float | None
+) -> FirstPath:
+    """The shortest path over a coarse lattice; where that shows none, over the default ones."""
+    from .grid_search import AStar
+
+    def watch(progress: Progress) -> bool:
+        seen = Progress(0, samples, seconds + progress.seconds, math.inf)
+        return callback is not None and bool(callback(seen))
+
+    seconds = 0.0
+    coarse = AStar(spacing=coarse_spacing(problem), neighbours=NEIGHBOURS)
+    for planner in (coarse, replace(coarse, spacing=None)):
+        rest = None if time_limit is None else max(time_limit - seconds, 1e-9)
+        found = planner.solve(problem, callback=watch, time_limit=rest)
+        seconds += found.seconds
+        early = found.stopped_by if found.stopped_by in ENDED_EARLY else ""
+        if found.path is not None or early:
+            break
+    return FirstPath(found.path, seconds, early)
