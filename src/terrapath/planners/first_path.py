@@ -14,12 +14,12 @@ from .base import INTERRUPT, Callback, Progress
 # A straight line that is longer than this many chords is dear: a way around is looked for.
 DEAR = 1.05
 
-# A lattice has no more nodes than these at first, so that it costs no more than the default
-# number of samples; among obstacles at least so many on a side, to see the gaps.
-MOST_NODES, NODES_AMONG_OBSTACLES = 40_000, 100
+# The first lattice has between so many nodes on a side, so that it shows valleys and gaps, and so
+# many, so that it costs no more than the default number of samples.
+FEWEST_NODES, MOST_NODES = 100, 200
 
-# The neighbours of a node. With eight, paths would be up to 8 % longer than needed.
-NEIGHBOURS = 16
+# The neighbours of a node. With fewer a search is hardly quicker, and oftener in a wrong valley.
+NEIGHBOURS = 32
 
 # What ends a search for a path before it is done.
 ENDED_EARLY = (INTERRUPT, "callback", "time limit")
@@ -62,13 +62,11 @@ def _is_cheap(problem: Problem) -> bool:
 
 
 def coarse_spacing(problem: Problem) -> float:
-    """The spacing of the first lattice, map units: as fine as the features, or as is cheap."""
-    side, free_space = problem.bounds.side, problem.free_space
-    wanted = problem.surface.resolution
-    if free_space.has_obstacles:
-        cells = (min(mask.spacing) for mask in free_space.masks)
-        wanted = min(wanted, side / NODES_AMONG_OBSTACLES, *cells)
-    return max(min(wanted, 0.1 * side), side / math.sqrt(MOST_NODES))
+    """The spacing of the first lattice, map units: a cell or a feature, as far as that is cheap."""
+    side = problem.bounds.side
+    cells = (min(mask.spacing) for mask in problem.free_space.masks)
+    finest = min(problem.surface.resolution, side / FEWEST_NODES, *cells)
+    return max(finest, side / MOST_NODES)
 
 
 def _over_lattices(

@@ -34,6 +34,9 @@ CHUNK = 512
 # another order would not help the processor's cache.
 UNORDERED = 2048
 
+# A batch with so many samples no longer fits in the cache: those beside the path come first.
+ALONG_PATH = 8192
+
 # One application of Line-R measures a piece that is at most this many features of the surface long.
 FEATURES_PER_PANEL = 4.0
 
@@ -186,13 +189,13 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
 def _side_by_side(draws: Array, informed: bool) -> Array:
     """Sort draws (m, 3) so that each one lies near the one before.
 
-    Their last two numbers are a point in a square; the order is row by row, to and fro. Before
-    them come those beside the path of an informed tree, in their order along it.
+    Their last two numbers are a point in a square; the order is row by row, to and fro. In a
+    large batch of an informed tree those beside its path come before, in their order along it.
     """
     row = np.floor(draws[:, 2] * math.isqrt(len(draws)))
     column = np.where(row % 2 == 0, draws[:, 1], 1.0 - draws[:, 1])
     order = row + column
-    if informed:
+    if informed and len(draws) >= ALONG_PATH:
         order = np.where(draws[:, 0] < PATH_SHARE, draws[:, 1] - 1.0, order)
     return draws[np.argsort(order)]
 
