@@ -21,8 +21,7 @@ FEWEST_NODES, MOST_NODES = 100, 200
 # The neighbours of a node. With fewer a search is hardly quicker, and oftener in a wrong valley.
 NEIGHBOURS = 32
 
-# What ends a search for a path before it is done.
-ENDED_EARLY = (INTERRUPT, "callback", "time limit")
+TIME_LIMIT = "time limit"
 
 
 class FirstPath(NamedTuple):
@@ -30,7 +29,7 @@ class FirstPath(NamedTuple):
 
     path: Path | None  # None where the lattices show none
     seconds: float = 0.0  # it took, without compiling
-    stopped_by: str = ""  # what ended the search for it early
+    stopped_by: str = ""  # what ended the whole run while it was looked for
 
 
 def first_path(
@@ -72,20 +71,23 @@ def coarse_spacing(problem: Problem) -> float:
 def _over_lattices(
     problem: Problem, callback: Callback | None, samples: int, time_limit: float | None
 ) -> FirstPath:
-    """The shortest path over a coarse lattice; where that shows none, over the default ones."""
+    """The shortest path over a coarse lattice; where that shows none, over the default ones.
+
+    The coarse one takes a moment, so only the others show their progress.
+    """
     from .grid_search import AStar
 
+    coarse = AStar(spacing=coarse_spacing(problem), neighbours=NEIGHBOURS)
+    found = coarse.solve(problem, time_limit=time_limit)
+    before = found.seconds
+
     def watch(progress: Progress) -> bool:
-        seen = Progress(0, samples, seconds + progress.seconds, math.inf)
+        seen = Progress(0, samples, before + progress.seconds, math.inf)
         return callback is not None and bool(callback(seen))
 
-    seconds = 0.0
-    coarse = AStar(spacing=coarse_spacing(problem), neighbours=NEIGHBOURS)
-    for planner in (coarse, replace(coarse, spacing=None)):
-        rest = None if time_limit is None else max(time_limit - seconds, 1e-9)
-        found = planner.solve(problem, callback=watch, time_limit=rest)
-        seconds += found.seconds
-        early = found.stopped_by if found.stopped_by in ENDED_EARLY else ""
-        if found.path is not None or early:
-            break
-    return FirstPath(found.path, seconds, early)
+    if found.path is None and found.stopped_by not in (INTERRUPT, TIME_LIMIT):
+        rest = None if time_limit is None else max(time_limit - before, 1e-9)
+        found = replace(coarse, spacing=None).solve(problem, callback=watch, time_limit=rest)
+        before += found.seconds
+    ended = found.stopped_by if found.stopped_by in (INTERRUPT, "callback") else ""
+    return FirstPath(found.path, before, ended)
