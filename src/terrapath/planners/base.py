@@ -22,6 +22,10 @@ INTERRUPT = "interrupt"
 # many times.
 HALVINGS = 2
 
+# The default step of a tree is this share of the side of a square as large as the bounds: 1.0 in the
+# paper's region of 12 x 12.
+STEPS_PER_SIDE = 12.0
+
 # The stages of a run.
 SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bound"
 
@@ -76,6 +80,37 @@ class Stopper:
         elif self.time_limit is not None and progress.seconds >= self.time_limit:
             self.stopped_by = "time limit"
         return bool(self.stopped_by)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TreeOptions:
+    """The options of a tree planner; see ``RRTStar``."""
+
+    planner: str  # its name
+    samples: int  # at most this many
+    step: float | None  # map units, None for the default
+    radius_factor: float  # 0 for a tree that is never rewired
+    goal_bias: float
+    seed: int
+    riemannian: bool  # edges are measured by Line-R, not by the chord
+    prune: bool
+    informed: bool
+    panel: float | None = None  # map units, None for the default
+    time_limit: float | None = None  # seconds
+    target_length: float = 0.0  # map units; infinite to stop at the first path
+
+
+def default_step(problem: Problem) -> float:
+    """A step that suits the region, map units."""
+    return problem.bounds.side / STEPS_PER_SIDE
+
+
+class FirstPath(NamedTuple):
+    """What a tree begins with."""
+
+    path: Path | None  # None where nothing was found
+    seconds: float = 0.0  # it took, without compiling
+    stopped_by: str = ""  # what ended the whole run while it was looked for
 
 
 class Planner(Protocol):

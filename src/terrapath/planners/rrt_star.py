@@ -14,7 +14,9 @@ from .._kernels.planners import rrt_star as kernels, tree as trees
 from .._kernels.planners.buckets import Buckets
 from .._kernels.planners.sampling import PATH_SHARE
 from ..problem import History, Path, Problem, SearchTree, Solution
+from ..problem.solution import sampled
 from ..surface import Surface
+from ..surface.metric import chord
 from ..validation import (
     Array,
     require_bool,
@@ -24,8 +26,17 @@ from ..validation import (
     require_positive,
     require_seed,
 )
-from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit, status_of
-from .first_path import FirstPath, first_path
+from .base import (
+    INTERRUPT,
+    Callback,
+    FirstPath,
+    Progress,
+    TreeOptions,
+    answer_without_search,
+    default_step,
+    least_limit,
+    status_of,
+)
 
 # Samples between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 512
@@ -34,38 +45,14 @@ CHUNK = 512
 # another order would not help the processor's cache.
 UNORDERED = 2048
 
+# A straight line that is longer than this many chords is dear: a path around is looked for.
+DEAR = 1.05
+
 # A batch with so many samples no longer fits in the cache: those beside the path come first.
 ALONG_PATH = 8192
 
 # One application of Line-R measures a piece that is at most this many features of the surface long.
 FEATURES_PER_PANEL = 4.0
-
-# The default step is this share of the side of a square as large as the bounds: 1.0 in the
-# paper's region of 12 x 12.
-STEPS_PER_SIDE = 12.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class TreeOptions:
-    """The options of a tree planner; see ``RRTStar``."""
-
-    planner: str  # its name
-    samples: int  # at most this many
-    step: float | None  # map units, None for the default
-    radius_factor: float  # 0 for a tree that is never rewired
-    goal_bias: float
-    seed: int
-    riemannian: bool  # edges are measured by Line-R, not by the chord
-    prune: bool
-    informed: bool
-    panel: float | None = None  # map units, None for the default
-    time_limit: float | None = None  # seconds
-    target_length: float = 0.0  # map units; infinite to stop at the first path
-
-
-def default_step(problem: Problem) -> float:
-    """A step that suits the region, map units."""
-    return problem.bounds.side / STEPS_PER_SIDE
 
 
 def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
@@ -86,19 +73,6 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
         prune=options.prune,
         informed=options.informed,
     )
-
-
-def _pieces(path: Path | None, step: float) -> Array:
-    """The points (m, 2) of a path, cut into edges of at most a step; none without a path."""
-    if path is None:
-        return np.empty((0, 2))
-    moves = np.diff(path.points, axis=0)
-    counts = np.maximum(np.ceil(np.hypot(*moves.T) / step - 1e-9), 1.0).astype(np.intp)
-    pieces = [
-        start + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * move
-        for start, move, count in zip(path.points, moves, counts, strict=False)
-    ]
-    return np.concatenate([*pieces, path.points[-1:]])
 
 
 def _allocate(samples: int, surface: Surface, branch: Array | None = None) -> trees.Tree:
@@ -250,24 +224,35 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
 
 
 def _first_path(problem: Problem, options: TreeOptions, callback: Callback | None) -> FirstPath:
-    """What an informed tree begins with; other trees begin with nothing."""
+    """What an informed tree begins with; other trees begin with nothing.
+
+    It is the straight line where that is free and cheap, else a path over a lattice.
+    """
     if not options.informed:
         return FirstPath(None)
-    return first_path(problem, callback, options.samples, options.time_limit)
+    started, straight = time.perf_counter(), None
+    if problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
+        straight = problem.path([problem.start, problem.goal])
+        least = float(chord(problem.surface, problem.start, problem.goal))
+        if straight.length <= DEAR * least:
+            return FirstPath(straight, time.perf_counter() - started)
+    from .first_path import path_over_lattices
+
+    return path_over_lattices(problem, options, callback, straight)
 
 
 def _best(search: _Search) -> tuple[Path | None, float | None]:
     """The shorter of the tree's path and the one that it began with, and its cost.
 
-    Lengths are true, because what a tree believes of its edges is an estimate. A tree that
-    measures chords minimises something else, so its own path counts where it has one.
+    Lengths are true: what a tree believes of its edges is an estimate. A tree that measures
+    chords minimises something else, so its own path counts where it has one.
     """
     path, first = _path(search.problem, search.tree), search.first.path
-    if first is not None and (
-        path is None or (search.options.riemannian and first.length < path.length)
-    ):
+    if path is None:
+        return first, None if first is None else first.length
+    if first is not None and search.options.riemannian and first.length < path.length:
         return first, first.length
-    return path, None if path is None else search.best_cost
+    return path, search.best_cost
 
 
 def _search_tree(tree: trees.Tree) -> SearchTree:
@@ -300,7 +285,8 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
         return answer
     settings = _kernel_options(problem, options)
     first = _first_path(problem, options, callback)
-    tree = _allocate(options.samples, problem.surface, _pieces(first.path, settings.step))
+    branch = None if first.path is None else sampled(first.path.points, settings.step)
+    tree = _allocate(options.samples, problem.surface, branch)
     _prepare(problem, tree, settings)
     search = _Search(problem, options, settings, tree, first)
     stopped_by = _run(search, callback)
