@@ -22,7 +22,7 @@ INTERRUPT = "interrupt"
 # many times.
 HALVINGS = 2
 
-# The default step of a tree is this share of the side of a square as large as the bounds: 1.0 in the
+# A tree's default step is this share of the side of a square as large as the bounds: 1.0 in the
 # paper's region of 12 x 12.
 STEPS_PER_SIDE = 12.0
 
