@@ -12,6 +12,7 @@ import math
 
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
+from ..surface.lengths import chord_through
 from .buckets import lay_out, nearest, put, resize, squared_distance, within
 from .sampling import distance_to_goal, is_beside_path, near_radius, sample
 from .tree import (
@@ -28,7 +29,7 @@ from .tree import (
     X,
     Y,
     adopt,
-    edge_length,
+    careful_length,
     pass_on_cost,
     place,
     plant,
@@ -48,9 +49,35 @@ def candidate_length(surface, tree, options, new, k):
         candidate.length = candidate.chord
         if options.riemannian:
             tree.counters[INTEGRATED] += 1
-            line_r = edge_length(surface, tree, new, candidate.vertex, options.panel)
-            candidate.length = max(line_r, candidate.chord)
+            refine_chord(surface, tree, options, new, k)
+            length = careful_length(surface, tree, options, new, candidate.vertex)
+            candidate.length = max(length, candidate.chord)
     return candidate.length
+
+
+@inner_kernel
+def refine_chord(surface, tree, options, new, k):
+    """On rough ground replace the k-th candidate's chord by a sum of short ones, at most once."""
+    candidate = tree.near[k]
+    if options.tolerance > 0.0 and candidate.refined == 0:
+        p, q = tree.places[new], tree.places[candidate.vertex]
+        through = chord_through(surface, p[X], p[Y], q[X], q[Y], options.panel)
+        candidate.chord = max(through, candidate.chord)
+        candidate.refined = 1
+
+
+@inner_kernel
+def is_ruled_out(surface, tree, options, new, k, come, limit):
+    """Is a cost plus the chord of the k-th candidate edge no less than the limit?
+
+    Always False for a tree that is not pruned.
+    """
+    if not options.prune:
+        return False
+    if come + tree.near[k].chord >= limit:
+        return True
+    refine_chord(surface, tree, options, new, k)
+    return come + tree.near[k].chord >= limit
 
 
 @inner_kernel
@@ -127,6 +154,7 @@ def measure_chord(tree, new, k):
     candidate.cost = tree.places[candidate.vertex, COST]
     candidate.length = -1.0
     candidate.free = -1
+    candidate.refined = 0
     return candidate.cost + candidate.chord
 
 
@@ -162,7 +190,7 @@ def choose_parent(surface, space, tree, options, new, count, promising):
         if turn == promising:
             continue
         come = tree.near[k].cost
-        if options.prune and come + tree.near[k].chord >= least:
+        if is_ruled_out(surface, tree, options, new, k, come, least):
             pruned += 1
             continue
         length = candidate_length(surface, tree, options, new, k)
@@ -183,9 +211,10 @@ def is_shorter(surface, space, tree, options, new, ancestor, spare):
     candidate.squared = squared_distance(tree.places, ancestor, p[X], p[Y])
     if candidate.squared > options.step * options.step:
         return False
-    at_least, least = measure_chord(tree, new, spare), p[COST]
+    measure_chord(tree, new, spare)
+    least = p[COST]
     tree.counters[CONSIDERED] += 1
-    if options.prune and at_least >= least:
+    if is_ruled_out(surface, tree, options, new, spare, candidate.cost, least):
         tree.counters[PRUNED] += 1
         return False
     length = candidate_length(surface, tree, options, new, spare)
@@ -220,7 +249,7 @@ def rewire(surface, space, tree, options, new, count):
         near = tree.near[k].vertex
         if near == parent:
             continue
-        if options.prune and come + tree.near[k].chord >= tree.near[k].cost:
+        if is_ruled_out(surface, tree, options, new, k, come, tree.near[k].cost):
             pruned += 1
             continue
         length = candidate_length(surface, tree, options, new, k)

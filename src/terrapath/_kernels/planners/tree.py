@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
-from ..surface.lengths import composite_boole, norm
+from ..surface.lengths import composite_boole, norm, segment_length
 from ..surface.surfaces import Metric, plus_layer, slope_at, spot_at, times_cost
 from .buckets import Buckets
 
@@ -44,11 +44,12 @@ LINK = record(
 # A candidate edge between the newest vertex and one near it.
 CANDIDATE = record(
     ("squared", np.float64),  # planar distance squared
-    ("chord", np.float64),
+    ("chord", np.float64),  # no path along the edge is shorter
     ("cost", np.float64),  # of the other vertex, before this extension
     ("length", np.float64),  # negative where not yet measured
     ("vertex", np.int32),
     ("free", np.int32),  # 1 free, 0 blocked, -1 not yet tested
+    ("refined", np.int64),  # 1 where the chord is a sum of short ones
 )
 
 
@@ -83,7 +84,8 @@ class Options(NamedTuple):
     step: float
     radius: float  # the near radius is radius * sqrt(area * log(n) / n), at most the step
     goal_bias: float
-    panel: float  # longest piece that one application of Line-R measures
+    panel: float  # longest piece that one application of a rule measures
+    tolerance: float  # of an edge on rough ground, as a share of its length; 0 for Line-R
     riemannian: bool  # edges measured by Line-R; otherwise by the chord
     prune: bool
     informed: bool
@@ -132,6 +134,19 @@ def edge_length(surface, graph, a, b, panel):
     dx, dy = dx / panels, dy / panels
     ends = norm(graph.vertices[a], dx, dy) + norm(graph.vertices[b], dx, dy)
     return composite_boole(surface, p[X], p[Y], dx, dy, ends, panels)
+
+
+@kernel
+def careful_length(surface, graph, options, a, b):
+    """Length of the edge between two vertices: by Line-R, or on rough ground adaptively.
+
+    There the nodes of Line-R would miss much; pieces are halved until two rules agree.
+    """
+    if options.tolerance == 0.0:
+        return edge_length(surface, graph, a, b, options.panel)
+    p, q = graph.places[a], graph.places[b]
+    panel, tolerance = options.panel, options.tolerance
+    return segment_length(surface, p[X], p[Y], q[X], q[Y], panel, tolerance)
 
 
 @kernel
