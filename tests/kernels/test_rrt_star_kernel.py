@@ -200,7 +200,9 @@ def test_an_informed_tree_begins_with_the_straight_line_where_that_is_cheap(step
 @pytest.mark.parametrize("obstacles", [[], [shapely.box(4.0, 4.0, 6.0, 6.0)]])
 def test_an_informed_tree_begins_with_a_lattice_path_where_the_straight_line_is_no_good(obstacles):
     problem = scene("six-peaks", obstacles)
-    branch = first_path.path_over_lattices(problem, tp.RRTStar()._tree_options(), None, None).path
+    branch = first_path.path_over_lattices(
+        problem, tp.RRTStar()._tree_options(), None, None, False
+    ).path
     lattice = tp.AStar(spacing=first_path.coarse_spacing(problem), neighbours=32).solve(problem)
     np.testing.assert_array_equal(branch.points, lattice.path.points)
     solution = tp.RRTStar(samples=1).solve(problem)

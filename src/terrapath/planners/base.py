@@ -105,6 +105,13 @@ def default_step(problem: Problem) -> float:
     return problem.bounds.side / STEPS_PER_SIDE
 
 
+def straight_path(problem: Problem) -> Path | None:
+    """The straight line from start to goal; None where it is not free."""
+    if not problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
+        return None
+    return problem.path([problem.start, problem.goal])
+
+
 class FirstPath(NamedTuple):
     """What a tree begins with."""
 

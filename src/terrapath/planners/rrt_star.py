@@ -16,7 +16,7 @@ from .._kernels.planners.sampling import PATH_SHARE
 from ..problem import History, Path, Problem, SearchTree, Solution
 from ..problem.solution import sampled
 from ..surface import Surface
-from ..surface.metric import chord, is_rough
+from ..surface.metric import ROUGH_FEATURES, ROUGH_TOLERANCE, chord, is_rough
 from ..validation import (
     Array,
     require_bool,
@@ -36,6 +36,7 @@ from .base import (
     default_step,
     least_limit,
     status_of,
+    straight_path,
 )
 
 # Samples between two looks at the clock, the callback and Ctrl-C.
@@ -54,10 +55,6 @@ ALONG_PATH = 8192
 # One application of Line-R measures a piece that is at most this many features of the surface long.
 FEATURES_PER_PANEL = 4.0
 
-# On rough ground an informed tree measures shorter pieces, and halves them until two rules agree to
-# this share: then an edge is right to 1e-3 where nearly every other rule errs by a tenth.
-FEATURES_ON_ROUGH, ROUGH_TOLERANCE = 0.5, 1e-4
-
 
 def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     bounds = problem.bounds
@@ -66,7 +63,7 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     least = 2.0 * math.sqrt(1.5 / math.pi)
     panel, tolerance = options.panel or FEATURES_PER_PANEL * problem.surface.resolution, 0.0
     if options.panel is None and options.informed and is_rough(problem.surface, bounds):
-        panel, tolerance = FEATURES_ON_ROUGH * problem.surface.resolution, ROUGH_TOLERANCE
+        panel, tolerance = ROUGH_FEATURES * problem.surface.resolution, ROUGH_TOLERANCE
     return trees.Options(
         *bounds,
         *problem.start,
@@ -230,22 +227,22 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
     return problem.path(tree.places[visited[::-1], : trees.COST])
 
 
-def _first_path(problem: Problem, options: TreeOptions, callback: Callback | None) -> FirstPath:
+def _first_path(
+    problem: Problem, options: TreeOptions, callback: Callback | None, is_rough: bool
+) -> FirstPath:
     """What an informed tree begins with; other trees begin with nothing.
 
     It is the straight line where that is free and cheap, else a path over a lattice.
     """
     if not options.informed:
         return FirstPath(None)
-    started, straight = time.perf_counter(), None
-    if problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
-        straight = problem.path([problem.start, problem.goal])
-        least = float(chord(problem.surface, problem.start, problem.goal))
-        if straight.length <= DEAR * least:
-            return FirstPath(straight, time.perf_counter() - started)
+    started, straight = time.perf_counter(), straight_path(problem)
+    least = float(chord(problem.surface, problem.start, problem.goal))
+    if straight is not None and straight.length <= DEAR * least:
+        return FirstPath(straight, time.perf_counter() - started)
     from .first_path import path_over_lattices
 
-    return path_over_lattices(problem, options, callback, straight)
+    return path_over_lattices(problem, options, callback, straight, is_rough)
 
 
 def _best(search: _Search) -> tuple[Path | None, float | None]:
@@ -291,7 +288,7 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     if answer is not None:
         return answer
     settings = _kernel_options(problem, options)
-    first = _first_path(problem, options, callback)
+    first = _first_path(problem, options, callback, settings.tolerance > 0.0)
     branch = None if first.path is None else sampled(first.path.points, settings.step)
     tree = _allocate(options.samples, problem.surface, branch)
     _prepare(problem, tree, settings)
