@@ -10,7 +10,7 @@ from .base import INTERRUPT, Callback, FirstPath, Progress, TreeOptions
 from .grid_search import AStar
 
 # The first lattice has between so many nodes on a side, so that it shows valleys and gaps, and so
-# many, so that it costs no more than the default number of samples, which cost more on rough ground.
+# many, so that it costs no more than the default number of samples. They cost more on rough ground.
 FEWEST_NODES, MOST_NODES, MOST_ON_ROUGH = 100, 200, 500
 
 # The neighbours of a node. With fewer a search is hardly quicker, and oftener in a wrong valley.

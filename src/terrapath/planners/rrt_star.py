@@ -216,7 +216,6 @@ def _run(search: _Search, callback: Callback | None) -> str:
 
 
 def _path(problem: Problem, tree: trees.Tree) -> Path | None:
-    """The tree's path to the goal."""
     vertex = int(tree.counters[trees.GOAL])
     if vertex < 0:
         return None
@@ -248,8 +247,7 @@ def _first_path(
 def _best(search: _Search) -> tuple[Path | None, float | None]:
     """The shorter of the tree's path and the one that it began with, and its cost.
 
-    Lengths are true: what a tree believes of its edges is an estimate. A tree that measures
-    chords minimises something else, so its own path counts where it has one.
+    Lengths are true. A tree that measures chords minimises something else, so its path counts.
     """
     path, first = _path(search.problem, search.tree), search.first.path
     if path is None:
