@@ -141,7 +141,7 @@ def test_what_a_tree_believes_of_its_edges_is_right_on_rough_ground(weight):
     assert errors.max() <= 1e-2
     assert solution.cost == pytest.approx(solution.length, rel=1e-3)
     points = solution.path.points
-    pairs = zip(points[:-1], points[1:], strict=True)
+    pairs = pairwise(points)
     assert solution.cost == pytest.approx(
         sum(lifted_length(surface, *pair) for pair in pairs), rel=1e-3
     )
