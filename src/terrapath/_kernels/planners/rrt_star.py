@@ -278,7 +278,7 @@ def refresh_buckets(tree, options, radius):
 # A sample beside the best path is left out where more than this many times log n of the tree's n
 # vertices are within the near radius. Uniform samples alone make 13.5 log n with the default
 # radius. So what a sample costs stays O(log n), and no uniform sample is ever left out.
-CROWD = 40.0
+CROWD = 30.0
 
 
 @kernel
