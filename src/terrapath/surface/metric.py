@@ -28,7 +28,8 @@ FEATURES_PER_PROBE, ROUGH, PROBES = 4.0, 3e-4, 256
 
 # There, edges are measured in shorter pieces, of so many features, and these are halved until two
 # rules agree to this share: that is right to 1e-3 where one rule for each piece errs by a tenth.
-ROUGH_FEATURES, ROUGH_TOLERANCE = 0.5, 1e-4
+# The number is a little above a half, so that rounding does not decide how many pieces a step has.
+ROUGH_FEATURES, ROUGH_TOLERANCE = 0.5 + 1e-9, 1e-4
 
 
 def metric_tensor(surface: Surface, points: npt.ArrayLike) -> Array:
