@@ -35,10 +35,18 @@ def _four_layers() -> Problem:
     return Problem(surface, scenes.START, scenes.GOAL, scenes.REGION, name="four-layers")
 
 
+DEFAULTS = "six-peaks, default options"
+
 GROUND: dict[str, Callable[[], Problem]] = {
     "six-peaks": lambda: scenes.load("six-peaks"),
+    DEFAULTS: lambda: scenes.load("six-peaks"),
     "four-layers": _four_layers,
 }
+
+
+def options_on(ground: str) -> dict[str, bool]:
+    """The planner's options; without the default ones samples are drawn everywhere."""
+    return {} if ground == DEFAULTS else {"informed": False}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +82,8 @@ class GrowthTrial(Trial[GrowthFound]):
     @property
     def settings(self) -> dict[str, Any]:
         """The settings; the ground depends on its name alone."""
-        return {"ground": self.scene, "options": asdict(self.planner)}
+        options = {**options_on(self.scene), **asdict(self.planner)}
+        return {"ground": self.scene, "options": options}
 
     def measure(self) -> GrowthFound:
         """Start the process and read its answer."""
@@ -143,11 +152,11 @@ def growth_targets(data: GrowthData) -> list[Target]:
 
 
 def measure_growth(scene: str, runs: GrowthRuns) -> GrowthFound:
-    """Measure the memory of the first run and the seconds of all; samples are drawn everywhere."""
+    """Measure the memory of the first run and the seconds of all."""
     problem = GROUND[scene]()
 
     def grow(samples: int) -> Any:
-        return plan(problem, "rrt-star-r", samples=samples, informed=False)
+        return plan(problem, "rrt-star-r", samples=samples, **options_on(scene))
 
     grow(500)
     forget_peak()

@@ -129,9 +129,9 @@ def growth_lines(data: GrowthData) -> list[str]:
     header = ["scene", "samples", "vertices", "seconds", "length", "bytes a sample", "GB in all"]
     return [
         *_paragraphs(
-            "RRT\\*-R with its default step, samples drawn everywhere; each in a process of its "
-            "own, warm. Memory is the process's peak; for a sample, it is how far the peak is "
-            "above the peak before."
+            "RRT\\*-R with its default step; samples drawn everywhere, but for the rows with the "
+            "default options. Each in a process of its own, warm. Memory is the process's peak; "
+            "for a sample, it is how far the peak is above the peak before."
         ),
         *markdown_table(header, map(_growth_row, data.rows)),
     ]

@@ -437,14 +437,15 @@ def test_meshes_are_laid_over_the_surface():
 def test_growth_is_told_with_its_targets(runner, here):
     data = growth.run_growth(TINY, runner)
     assert [(row.scene, row.samples) for row in data.rows] == [
-        (ground, samples) for ground in ("six-peaks", "four-layers") for samples in (1_000, 10_000)
+        (ground, samples) for ground in growth.GROUND for samples in (1_000, 10_000)
     ]
     assert len(growth.GROUND["four-layers"]().surface.layers) == 4
     assert all(row.found.length > 14.0 for row in data.rows)
     assert all(row.bytes_per_sample is None for row in data.rows)  # too few to tell
-    six, four, complete = growth.growth_targets(data)
+    six, defaults, four, complete = growth.growth_targets(data)
     assert six.what == "six-peaks: seconds of 10,000 samples over 1,000"
     assert six.found > 1.0
+    assert defaults.what == "six-peaks, default options: seconds of 10,000 samples over 1,000"
     assert four.limit == growth.GROWTH_TARGET
     assert complete.met
     grown = growth.GrowthFound(Timing((1.0,), (1.0,)), None, 9, 10**6, 10**6 + 15 * 10**7)

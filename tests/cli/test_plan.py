@@ -316,7 +316,7 @@ def test_one_file_by_two_names_is_named_twice(project, capsys):
 
 def test_no_path_within_the_limits_exits_with_3_and_writes_nothing(tmp_path, capsys):
     output = tmp_path / "a.geojson"
-    arguments = ["six-peaks", "--samples", "20", "--step", "0.1", "--output", str(output)]
+    arguments = ["six-peaks", "--samples", "20", "--uniform", "--output", str(output)]
     assert run(["plan", *arguments]) == 3
     captured = capsys.readouterr()
     assert "not-found" in captured.out
@@ -434,7 +434,7 @@ def test_the_goal_may_lie_on_the_edge_of_the_bounds(planner, capsys):
 def test_a_planner_without_a_path_gets_no_bound(capsys, monkeypatch):
     monkeypatch.setattr(finished, "lower_bound", None)
     monkeypatch.setattr(finished, "refine", None)
-    code, answer = json_of(capsys, "six-peaks", "--samples", "20", "--step", "0.1")
+    code, answer = json_of(capsys, "six-peaks", "--samples", "20", "--uniform")
     assert code == 3
     assert answer["lower_bound"] is None
 

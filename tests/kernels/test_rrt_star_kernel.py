@@ -7,11 +7,12 @@ import math
 import numpy as np
 import pytest
 import shapely
+from scipy import spatial
 
 import planner_oracles as oracles
 import terrapath as tp
 from terrapath._kernels.planners import rrt_star as kernels, sampling, tree as trees
-from terrapath.planners import rrt_star
+from terrapath.planners import first_path, rrt_star
 from terrapath.problem import scenes
 
 LAYERS = {
@@ -160,7 +161,7 @@ def test_a_share_of_informed_samples_lies_around_the_best_path():
         away = np.array([x, y]) - centre
         assert math.hypot(*away) == pytest.approx(radius * abs(offset) ** 5, abs=1e-9)
         assert along @ away == pytest.approx(0.0, abs=1e-9)
-        assert offset * (along[0] * away[1] - along[1] * away[0]) >= 0.0
+        assert offset * (along[0] * away[1] - along[1] * away[0]) >= -1e-15  # rounding
         assert line.distance(shapely.Point(x, y)) <= math.hypot(*away) + 1e-9
         distances.append(math.hypot(*away) / radius)
         worth.append(worthwhile)
@@ -187,24 +188,51 @@ def test_the_other_informed_samples_are_spread_over_the_ellipse():
 
 
 @pytest.mark.parametrize("step", [0.7, 1.0, 30.0])
-def test_an_informed_tree_begins_with_the_straight_way(step):
-    problem = scene("six-peaks")
+def test_an_informed_tree_begins_with_the_straight_line_where_that_is_cheap(step):
+    flat = tp.Surface.from_peaks([[]])
+    problem = tp.Problem(flat, scenes.START, scenes.GOAL, scenes.REGION)
+    solution = tp.RRTStar(samples=1, step=step).solve(problem)
+    assert solution.length == pytest.approx(problem.straight_length, rel=1e-12)
     steps = math.ceil(math.dist(problem.start, problem.goal) / step)
-    # The goal joins as soon as it is one step away.
-    solution = tp.RRTStar(samples=max(steps - 1, 1), step=step).solve(problem)
-    assert solution.length == pytest.approx(problem.straight_length, rel=1e-6)
-    assert len(solution.tree.points) == steps + 1
+    np.testing.assert_array_equal(solution.tree.parents[: steps + 1], np.arange(-1, steps))
 
 
-def test_where_the_straight_way_is_blocked_samples_are_drawn_as_ever():
-    problem = scene("six-peaks", [shapely.box(4.0, 4.0, 6.0, 6.0)])
-    tree = tp.RRTStar(samples=8).solve(problem).tree
-    off_line = np.abs(tree.points[:, 0] - tree.points[:, 1]) > 1e-9
-    # Five steps lead straight to the box; the sixth is in the way.
-    assert not off_line[:6].any()
-    np.testing.assert_array_equal(tree.parents[1:6], np.arange(5))
-    assert tree.points[:6].max() < 4.0
-    assert len(tree.points) == 6 or off_line[6:].any()
+@pytest.mark.parametrize("obstacles", [[], [shapely.box(4.0, 4.0, 6.0, 6.0)]])
+def test_an_informed_tree_begins_with_a_lattice_path_where_the_straight_line_is_no_good(obstacles):
+    problem = scene("six-peaks", obstacles)
+    branch = first_path.path_over_lattices(
+        problem, tp.RRTStar()._tree_options(), None, None, False
+    ).path
+    lattice = tp.AStar(spacing=first_path.coarse_spacing(problem), neighbours=32).solve(problem)
+    np.testing.assert_array_equal(branch.points, lattice.path.points)
+    solution = tp.RRTStar(samples=1).solve(problem)
+    assert solution.length <= branch.length < problem.straight_length
+    # The branch is a chain along that path.
+    chain = solution.tree.points[:-1]
+    np.testing.assert_array_equal(chain[-1], problem.goal)
+    assert np.hypot(*np.diff(chain, axis=0).T).max() <= 1.0 + 1e-12
+    assert shapely.distance(branch.line, shapely.points(chain)).max() <= 1e-12
+
+
+def test_a_crowd_beside_the_path_is_limited_and_uniform_samples_never_are(monkeypatch):
+    problem, planner = scene("one-peak"), tp.RRTStar(samples=40_000, step=30.0)
+    draws = np.random.default_rng(1).random((40_000, 3))
+    beside, spread = draws.copy(), draws.copy()
+    beside[:, 0] *= sampling.PATH_SHARE
+    spread[:, 0] = sampling.PATH_SHARE + (1.0 - sampling.PATH_SHARE) * draws[:, 0]
+    tree, settings = grown(problem, planner, draws[:200])
+    grow = (problem.surface.data, problem.free_space.data, tree, settings)
+    kernels.grow(*grow, beside)
+    crowd = int(tree.counters[trees.VERTICES])
+    assert crowd < 20_000  # most of them are left out
+    points = tree.places[:crowd, :2]
+    radius = sampling.near_radius(tree, settings)
+    disc = spatial.cKDTree(points).query_ball_point(points, 0.5 * radius, return_length=True)
+    # Of those within half the radius of any vertex, the last to come saw all the others.
+    assert disc.max() <= kernels.CROWD * math.log(crowd) + 1
+    worth = sum(kernels.sample(*grow[:1], tree, settings, draw)[2] for draw in spread[:500])
+    kernels.grow(*grow, spread[:500])
+    assert int(tree.counters[trees.VERTICES]) - crowd >= 0.95 * worth
 
 
 CHAIN = [(2.0, 1.0), (2.0, 2.0), (3.0, 2.0), (3.0, 3.0)]
@@ -225,7 +253,7 @@ def test_an_informed_tree_skips_parents_where_that_is_shorter(informed, obstacle
     planner = tp.RRTStar(samples=10, step=2.5, radius_factor=0.05, informed=informed)
     tree, settings = grown(problem, planner, np.empty((0, 3)))
     for x, y in CHAIN:
-        assert kernels.extend(flat.data, problem.free_space.data, tree, settings, x, y)
+        assert kernels.extend(flat.data, problem.free_space.data, tree, settings, x, y, False)
     found = rrt_star._search_tree(tree)
     np.testing.assert_array_equal(found.points[1:], CHAIN)
     np.testing.assert_array_equal(found.parents, parents)

@@ -278,7 +278,7 @@ def test_a_goal_that_cannot_be_reached_loses_and_its_bound_does_not_count():
 
 
 def test_a_goal_not_found_keeps_the_bound_of_its_chord(problem):
-    poor = make_finished("rrt-star-r", samples=40, step=0.2, bound=True)
+    poor = make_finished("rrt-star-r", samples=40, step=0.2, bound=True, informed=False)
     answers = plan_goals(problem, poor, [(10, 10), (0.1, 0.1)], every=True)
     assert answers[0].solution.status is tp.Status.NOT_FOUND
     assert answers[0].least == pytest.approx(tp.chord(problem.surface, (0, 0), (10, 10)))

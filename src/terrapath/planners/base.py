@@ -24,6 +24,10 @@ HALVINGS = 2
 # But never to more nodes than this.
 MOST_HALVED = 2**24
 
+# A tree's default step is this share of the side of a square as large as the bounds: 1.0 in the
+# paper's region of 12 x 12.
+STEPS_PER_SIDE = 12.0
+
 # The stages of a run.
 SEARCHING, REFINING, PROVING = "searching", "refining the path", "proving the bound"
 
@@ -85,6 +89,44 @@ class Stopper:
         elif self.time_limit is not None and progress.seconds >= self.time_limit:
             self.stopped_by = "time limit"
         return bool(self.stopped_by)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TreeOptions:
+    """The options of a tree planner; see ``RRTStar``."""
+
+    planner: str  # its name
+    samples: int  # at most this many
+    step: float | None  # map units, None for the default
+    radius_factor: float  # 0 for a tree that is never rewired
+    goal_bias: float
+    seed: int
+    riemannian: bool  # edges are measured by Line-R, not by the chord
+    prune: bool
+    informed: bool
+    panel: float | None = None  # map units, None for the default
+    time_limit: float | None = None  # seconds
+    target_length: float = 0.0  # map units; infinite to stop at the first path
+
+
+def default_step(problem: Problem) -> float:
+    """A step that suits the region, map units."""
+    return problem.bounds.side / STEPS_PER_SIDE
+
+
+def straight_path(problem: Problem) -> Path | None:
+    """The straight line from start to goal; None where it is not free."""
+    if not problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
+        return None
+    return problem.path([problem.start, problem.goal])
+
+
+class FirstPath(NamedTuple):
+    """What a tree begins with."""
+
+    path: Path | None  # None where nothing was found
+    seconds: float = 0.0  # it took, without compiling
+    stopped_by: str = ""  # what ended the whole run while it was looked for
 
 
 class Planner(Protocol):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from ..problem import Problem, Solution
 from ..validation import require_count, require_fraction, require_positive, require_seed
-from .base import Callback, least_limit
-from .rrt_star import TreeOptions, search_tree
+from .base import Callback, TreeOptions, least_limit
+from .rrt_star import search_tree
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,8 +12,11 @@ import numpy as np
 
 from .._kernels.planners import rrt_star as kernels, tree as trees
 from .._kernels.planners.buckets import Buckets
+from .._kernels.planners.sampling import PATH_SHARE
 from ..problem import History, Path, Problem, SearchTree, Solution
+from ..problem.solution import sampled
 from ..surface import Surface
+from ..surface.metric import ROUGH_FEATURES, ROUGH_TOLERANCE, chord, is_rough
 from ..validation import (
     Array,
     require_bool,
@@ -23,7 +26,18 @@ from ..validation import (
     require_positive,
     require_seed,
 )
-from .base import INTERRUPT, Callback, Progress, answer_without_search, least_limit, status_of
+from .base import (
+    INTERRUPT,
+    Callback,
+    FirstPath,
+    Progress,
+    TreeOptions,
+    answer_without_search,
+    default_step,
+    least_limit,
+    status_of,
+    straight_path,
+)
 
 # Samples between two looks at the clock, the callback and Ctrl-C.
 CHUNK = 512
@@ -32,35 +46,14 @@ CHUNK = 512
 # another order would not help the processor's cache.
 UNORDERED = 2048
 
+# A straight line that is longer than this many chords is dear: a path around is looked for.
+DEAR = 1.05
+
+# A batch with so many samples no longer fits in the cache: those beside the path come first.
+ALONG_PATH = 8192
+
 # One application of Line-R measures a piece that is at most this many features of the surface long.
 FEATURES_PER_PANEL = 4.0
-
-# The default step is this share of the side of a square as large as the bounds: 1.0 in the
-# paper's region of 12 x 12.
-STEPS_PER_SIDE = 12.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class TreeOptions:
-    """The options of a tree planner; see ``RRTStar``."""
-
-    planner: str  # its name
-    samples: int  # at most this many
-    step: float | None  # map units, None for the default
-    radius_factor: float  # 0 for a tree that is never rewired
-    goal_bias: float
-    seed: int
-    riemannian: bool  # edges are measured by Line-R, not by the chord
-    prune: bool
-    informed: bool
-    panel: float | None = None  # map units, None for the default
-    time_limit: float | None = None  # seconds
-    target_length: float = 0.0  # map units; infinite to stop at the first path
-
-
-def default_step(problem: Problem) -> float:
-    """A step that suits the region, map units."""
-    return problem.bounds.side / STEPS_PER_SIDE
 
 
 def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
@@ -68,7 +61,9 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     # Karaman and Frazzoli (2011), theorem 38 at d = 2; the kernel multiplies by the root of
     # the area that is searched, which is at least that of the free space in it.
     least = 2.0 * math.sqrt(1.5 / math.pi)
-    panel = options.panel or FEATURES_PER_PANEL * problem.surface.resolution
+    panel, tolerance = options.panel or FEATURES_PER_PANEL * problem.surface.resolution, 0.0
+    if options.panel is None and options.informed and is_rough(problem.surface, bounds):
+        panel, tolerance = ROUGH_FEATURES * problem.surface.resolution, ROUGH_TOLERANCE
     return trees.Options(
         *bounds,
         *problem.start,
@@ -77,14 +72,17 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
         radius=float(options.radius_factor * least),
         goal_bias=float(options.goal_bias),
         panel=float(panel),
+        tolerance=tolerance,
         riemannian=options.riemannian,
         prune=options.prune,
         informed=options.informed,
     )
 
 
-def _allocate(samples: int, surface: Surface) -> trees.Tree:
-    size = samples + 2  # the start, and the goal that may join with the last sample
+def _allocate(samples: int, surface: Surface, branch: Array | None = None) -> trees.Tree:
+    branch = np.empty((0, 2)) if branch is None else branch
+    # The start, the first branch, and the goal that may join with the last sample.
+    size = samples + 2 + len(branch)
     most = size // 2 + 64  # buckets
     return trees.Tree(
         places=np.empty((size, trees.LIFTED + len(surface.layers))),
@@ -99,6 +97,7 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
             shape=np.zeros(2, np.int64),
         ),
         floor=surface.least_cost,
+        branch=branch,
         near=np.empty(size, trees.CANDIDATE),
         queue=np.empty(size, np.int32),
     )
@@ -106,18 +105,19 @@ def _allocate(samples: int, surface: Surface) -> trees.Tree:
 
 @dataclass
 class _Search:
-    """A running search: the tree, the clock and the history."""
+    """A running search: the tree, what it began with, the clock and the history."""
 
     problem: Problem
     options: TreeOptions
     settings: trees.Options
     tree: trees.Tree
+    first: FirstPath
     started: float = field(default_factory=time.perf_counter)
     rows: list[tuple[int, float, float]] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
-        return time.perf_counter() - self.started
+        return time.perf_counter() - self.started + self.first.seconds
 
     @property
     def goal(self) -> int:
@@ -164,17 +164,21 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
     return ""
 
 
-def _side_by_side(draws: Array) -> Array:
+def _side_by_side(draws: Array, informed: bool) -> Array:
     """Sort draws (m, 3) so that each one lies near the one before.
 
-    Their last two numbers are a point in a square; the order is row by row, to and fro.
+    Their last two numbers are a point in a square; the order is row by row, to and fro. In a
+    large batch of an informed tree those beside its path come before, in their order along it.
     """
     row = np.floor(draws[:, 2] * math.isqrt(len(draws)))
     column = np.where(row % 2 == 0, draws[:, 1], 1.0 - draws[:, 1])
-    return draws[np.argsort(row + column)]
+    order = row + column
+    if informed and len(draws) >= ALONG_PATH:
+        order = np.where(draws[:, 0] < PATH_SHARE, draws[:, 1] - 1.0, order)
+    return draws[np.argsort(order)]
 
 
-def _chunks(seed: int, samples: int) -> Iterator[Array]:
+def _chunks(seed: int, samples: int, informed: bool = False) -> Iterator[Array]:
     """The uniform numbers (m, 3) that samples are drawn with, chunk by chunk.
 
     They are drawn in batches; each is a quarter of all those before. Within a batch the order is
@@ -191,14 +195,17 @@ def _chunks(seed: int, samples: int) -> Iterator[Array]:
         drawn += len(batch)
         if drawn >= samples:
             return
-        batch = _side_by_side(random.random((drawn // 4, 3)))
+        batch = _side_by_side(random.random((drawn // 4, 3)), informed)
 
 
 def _run(search: _Search, callback: Callback | None) -> str:
     """Grow the tree until there is a reason to stop, and return it."""
-    reason = ""
+    options, reason = search.options, search.first.stopped_by
+    if reason:
+        search.note()
+        return reason
     try:
-        for draws in _chunks(search.options.seed, search.options.samples):
+        for draws in _chunks(options.seed, options.samples, options.informed):
             search.grow(draws)
             if reason := _reason_to_stop(search, callback):
                 break
@@ -217,6 +224,37 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
         visited.append(vertex)
         vertex = int(parents[vertex])
     return problem.path(tree.places[visited[::-1], : trees.COST])
+
+
+def _first_path(
+    problem: Problem, options: TreeOptions, callback: Callback | None, is_rough: bool
+) -> FirstPath:
+    """What an informed tree begins with; other trees begin with nothing.
+
+    It is the straight line where that is free and cheap, else a path over a lattice.
+    """
+    if not options.informed:
+        return FirstPath(None)
+    started, straight = time.perf_counter(), straight_path(problem)
+    least = float(chord(problem.surface, problem.start, problem.goal))
+    if straight is not None and straight.length <= DEAR * least:
+        return FirstPath(straight, time.perf_counter() - started)
+    from .first_path import path_over_lattices
+
+    return path_over_lattices(problem, options, callback, straight, is_rough)
+
+
+def _best(search: _Search) -> tuple[Path | None, float | None]:
+    """The shorter of the tree's path and the one that it began with, and its cost.
+
+    Lengths are true. A tree that measures chords minimises something else, so its path counts.
+    """
+    path, first = _path(search.problem, search.tree), search.first.path
+    if path is None:
+        return first, None if first is None else first.length
+    if first is not None and search.options.riemannian and first.length < path.length:
+        return first, first.length
+    return path, search.best_cost
 
 
 def _search_tree(tree: trees.Tree) -> SearchTree:
@@ -247,19 +285,21 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     answer = answer_without_search(problem, options.planner, options.seed)
     if answer is not None:
         return answer
-    tree = _allocate(options.samples, problem.surface)
     settings = _kernel_options(problem, options)
+    first = _first_path(problem, options, callback, settings.tolerance > 0.0)
+    branch = None if first.path is None else sampled(first.path.points, settings.step)
+    tree = _allocate(options.samples, problem.surface, branch)
     _prepare(problem, tree, settings)
-    search = _Search(problem, options, settings, tree)
+    search = _Search(problem, options, settings, tree, first)
     stopped_by = _run(search, callback)
     seconds = search.seconds
-    path = _path(problem, tree)
+    path, cost = _best(search)
     return Solution(
         problem=problem,
         planner=options.planner,
         status=status_of(path, stopped_by),
         path=path,
-        cost=None if path is None else search.best_cost,
+        cost=cost,
         seconds=seconds,
         samples=search.samples,
         seed=options.seed,
@@ -281,13 +321,16 @@ class RRTStar:
     seed : of the random generator; the same seed gives the same tree, to the last bit.
     radius_factor : the search radius, as a multiple of the least one that optimality needs.
     goal_bias : share of samples that are the goal, until it is reached.
-    informed : begin with the straight line to the goal. Then leave out samples that cannot
-        improve the best path, by their chords (Gammell et al. 2014), and draw 0.3 of them near
-        it (Akgun and Stilman 2011). Hang vertices below their parents' parents where that is
-        shorter (Jeong et al. 2019). With ``False`` all of the region is sampled, as in the paper.
+    informed : begin with the straight line to the goal, or where that is blocked or dear with a
+        path over a coarse lattice. Then leave out samples that cannot improve the best path, by
+        their chords (Gammell et al. 2014), and draw 0.3 of them near it (Akgun and Stilman 2011);
+        where the tree is crowded these are left out. Hang vertices below their parents' parents
+        where that is shorter (Jeong et al. 2019). With ``False`` all of the region is sampled, as
+        in the paper.
     prune : do not measure edges whose chord is already too long; the tree stays the same.
     panel : longest piece of an edge that one application of Line-R measures, map units; by
-        default as long as the surface's features allow; ``math.inf`` is exactly Algorithm 1.
+        default as long as the surface's features allow, and on rough ground edges of informed
+        trees are measured adaptively; ``math.inf`` is exactly Algorithm 1.
     time_limit : seconds. target_length : stop when the cost is this low, map units.
 
     Source: the paper. What it leaves open is described in ``_kernels/planners/rrt_star.py``.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PROFILE_POINTS = 256
 
 
-def _sampled(points: Array, finest: float) -> Array:
+def sampled(points: Array, finest: float) -> Array:
     """A polyline (m, 2) whose segments are cut into equal ones, no longer than ``finest``.
 
     Where ``finest`` is 0 the segments stay as they are.
@@ -63,7 +63,7 @@ class Path:
     def profile(self) -> Profile:
         """The surface along the path, sampled finely enough to show every feature of it."""
         finest = min(0.25 * self.surface.resolution, self.line.length / PROFILE_POINTS)
-        points = _sampled(self.points, finest)
+        points = sampled(self.points, finest)
         steps = metric.segment_lengths(self.surface, points[:-1], points[1:])
         distance = np.concatenate([[0.0], np.cumsum(steps)])
         values, costs = self.surface.values(points), self.surface.cost_values(points)

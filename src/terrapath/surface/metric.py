@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -12,12 +13,23 @@ from .._kernels.surface.surfaces import fill_metric
 from ..errors import InputError
 from ..validation import Array, as_points
 from . import Surface
+from .bounds import Bounds
 
 # Relative tolerance of a true length; the promised accuracy is 1e-9.
 QUADRATURE_TOLERANCE = 1e-12
 
 # Quadrature starts with pieces that are as long as this many of the surface's smallest features.
 FEATURES_PER_PIECE = 4.0
+
+# Ground is rough where a rule of seven points over this many of its features is wrong by more than
+# this share, in the mean of so many probes. Real terrain exaggerated ten times is 2e-3 to 1e-2, the
+# paper's scenes are below 2e-4.
+FEATURES_PER_PROBE, ROUGH, PROBES = 4.0, 3e-4, 256
+
+# There, edges are measured in shorter pieces, of so many features, and these are halved until two
+# rules agree to this share: that is right to 1e-3 where one rule for each piece errs by a tenth.
+# The number is a little above a half, so that rounding does not decide how many pieces a step has.
+ROUGH_FEATURES, ROUGH_TOLERANCE = 0.5 + 1e-9, 1e-4
 
 
 def metric_tensor(surface: Surface, points: npt.ArrayLike) -> Array:
@@ -118,3 +130,25 @@ def curve_length(surface: Surface, points: npt.ArrayLike) -> float:
     if array.ndim != 2 or len(array) < 2:
         raise InputError(f"points has shape {array.shape}; a curve needs (m, 2) with m >= 2")
     return float(segment_lengths(surface, array[:-1], array[1:]).sum())
+
+
+def is_rough(surface: Surface, bounds: Bounds) -> bool:
+    """Do rules of a few points miss much of the surface within the bounds?
+
+    Segments of a few features in all directions, spread evenly over the bounds, are measured by
+    one rule each and by adaptive quadrature.
+    """
+    if math.isinf(surface.resolution):
+        return False
+    k = np.arange(PROBES)[:, None]
+    # Roberts' sequence (2018), and directions that turn by the golden angle.
+    shares = (0.5 + k * [0.7548776662466927, 0.5698402909980532]) % 1.0
+    angles, low, high = 2.399963229728653 * k, np.array(bounds[:2]), np.array(bounds[2:])
+    longest = FEATURES_PER_PROBE * surface.resolution
+    a = low + shares * (high - low)
+    b = np.clip(a + longest * np.hstack([np.cos(angles), np.sin(angles)]), low, high)
+    once, adaptive = np.empty(PROBES), np.empty(PROBES)
+    lengths.fill_segment_lengths(surface.data, a, b, longest, math.inf, once)
+    shortest = ROUGH_FEATURES * surface.resolution
+    lengths.fill_segment_lengths(surface.data, a, b, shortest, ROUGH_TOLERANCE, adaptive)
+    return bool(np.abs(once - adaptive).sum() > ROUGH * adaptive.sum())

@@ -4,16 +4,17 @@ What the paper leaves open, and what is done here: Algorithm 3 as printed never 
 Cost(v_new) after it changes v_min; the update is clearly meant, and is made here. The goal joins
 the tree as a vertex as soon as one extension can reach it, and is then rewired like any other
 vertex. The length of an edge is max(Line-R, chord): both estimate its true length, and the chord
-is never above it. An informed tree tries the straight line to the goal first. Where that is
-shorter, it joins a new vertex to its parent's parent.
+is never above it. An informed tree begins with a path, its first branch. Where that is shorter, it
+joins a new vertex to its parent's parent.
 """
 
 import math
 
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
+from ..surface.lengths import chord_through
 from .buckets import lay_out, nearest, put, resize, squared_distance, within
-from .sampling import distance_to_goal, near_radius, sample
+from .sampling import distance_to_goal, is_beside_path, near_radius, sample
 from .tree import (
     CHECKED,
     CONSIDERED,
@@ -24,12 +25,11 @@ from .tree import (
     PRUNED,
     REWIRED,
     SAMPLES,
-    STRAIGHT,
     VERTICES,
     X,
     Y,
     adopt,
-    edge_length,
+    careful_length,
     pass_on_cost,
     place,
     plant,
@@ -49,9 +49,35 @@ def candidate_length(surface, tree, options, new, k):
         candidate.length = candidate.chord
         if options.riemannian:
             tree.counters[INTEGRATED] += 1
-            line_r = edge_length(surface, tree, new, candidate.vertex, options.panel)
-            candidate.length = max(line_r, candidate.chord)
+            refine_chord(surface, tree, options, new, k)
+            length = careful_length(surface, tree, options, new, candidate.vertex)
+            candidate.length = max(length, candidate.chord)
     return candidate.length
+
+
+@inner_kernel
+def refine_chord(surface, tree, options, new, k):
+    """On rough ground replace the k-th candidate's chord by a sum of short ones, at most once."""
+    candidate = tree.near[k]
+    if options.tolerance > 0.0 and candidate.refined == 0:
+        p, q = tree.places[new], tree.places[candidate.vertex]
+        through = chord_through(surface, p[X], p[Y], q[X], q[Y], options.panel)
+        candidate.chord = max(through, candidate.chord)
+        candidate.refined = 1
+
+
+@inner_kernel
+def is_ruled_out(surface, tree, options, new, k, come, limit):
+    """Is a cost plus the chord of the k-th candidate edge no less than the limit?
+
+    Always False for a tree that is not pruned.
+    """
+    if not options.prune:
+        return False
+    if come + tree.near[k].chord >= limit:
+        return True
+    refine_chord(surface, tree, options, new, k)
+    return come + tree.near[k].chord >= limit
 
 
 @inner_kernel
@@ -128,6 +154,7 @@ def measure_chord(tree, new, k):
     candidate.cost = tree.places[candidate.vertex, COST]
     candidate.length = -1.0
     candidate.free = -1
+    candidate.refined = 0
     return candidate.cost + candidate.chord
 
 
@@ -163,7 +190,7 @@ def choose_parent(surface, space, tree, options, new, count, promising):
         if turn == promising:
             continue
         come = tree.near[k].cost
-        if options.prune and come + tree.near[k].chord >= least:
+        if is_ruled_out(surface, tree, options, new, k, come, least):
             pruned += 1
             continue
         length = candidate_length(surface, tree, options, new, k)
@@ -184,9 +211,10 @@ def is_shorter(surface, space, tree, options, new, ancestor, spare):
     candidate.squared = squared_distance(tree.places, ancestor, p[X], p[Y])
     if candidate.squared > options.step * options.step:
         return False
-    at_least, least = measure_chord(tree, new, spare), p[COST]
+    measure_chord(tree, new, spare)
+    least = p[COST]
     tree.counters[CONSIDERED] += 1
-    if options.prune and at_least >= least:
+    if is_ruled_out(surface, tree, options, new, spare, candidate.cost, least):
         tree.counters[PRUNED] += 1
         return False
     length = candidate_length(surface, tree, options, new, spare)
@@ -221,7 +249,7 @@ def rewire(surface, space, tree, options, new, count):
         near = tree.near[k].vertex
         if near == parent:
             continue
-        if options.prune and come + tree.near[k].chord >= tree.near[k].cost:
+        if is_ruled_out(surface, tree, options, new, k, come, tree.near[k].cost):
             pruned += 1
             continue
         length = candidate_length(surface, tree, options, new, k)
@@ -247,14 +275,23 @@ def refresh_buckets(tree, options, radius):
         tree.counters[LAID_OUT] = count
 
 
+# A sample beside the best path is left out where more than this many times log n of the tree's n
+# vertices are within the near radius. Uniform samples alone make 13.5 log n with the default
+# radius. So what a sample costs stays O(log n), and no uniform sample is ever left out.
+CROWD = 30.0
+
+
 @kernel
-def extend(surface, space, tree, options, x, y):
-    """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew."""
+def extend(surface, space, tree, options, x, y, is_beside):
+    """Algorithm 3: steer from the nearest vertex towards (x, y). True where the tree grew.
+
+    is_beside : the sample is one of those beside the best path, which a crowd leaves out.
+    """
     new = tree.counters[VERTICES]
     radius = near_radius(tree, options)
     refresh_buckets(tree, options, radius)
     x, y, count, closest = find_near(tree, options, radius, x, y)
-    if tree.near[closest].squared == 0.0:
+    if tree.near[closest].squared == 0.0 or (is_beside and count > CROWD * math.log(new)):
         return False
     place(surface, tree, new, x, y)
     promising = measure_chords(tree, new, count)
@@ -276,25 +313,48 @@ def join_goal(surface, space, tree, options):
     """Make the goal a vertex where the newest vertex is at most one step away from it."""
     newest = tree.counters[VERTICES] - 1
     if 0.0 < distance_to_goal(tree, options, newest) <= options.step:
-        extend(surface, space, tree, options, options.goal_x, options.goal_y)
+        extend(surface, space, tree, options, options.goal_x, options.goal_y, False)
         newest = tree.counters[VERTICES] - 1
     if distance_to_goal(tree, options, newest) == 0.0:
         tree.counters[GOAL] = newest
 
 
 @kernel
+def hang_branch(surface, space, tree, options):
+    """Make the points of the first branch vertices, each the child of the one before.
+
+    It ends before an edge that is not free, or has no length in floating point.
+    """
+    for m in range(1, tree.branch.shape[0]):
+        new = tree.counters[VERTICES]
+        place(surface, tree, new, tree.branch[m, 0], tree.branch[m, 1])
+        candidate, p = tree.near[0], tree.places[new]
+        candidate.vertex = new - 1
+        candidate.squared = squared_distance(tree.places, new - 1, p[X], p[Y])
+        measure_chord(tree, new, 0)
+        length = candidate_length(surface, tree, options, new, 0)
+        if not (length < math.inf and candidate_is_free(space, tree, new, 0)):
+            return
+        adopt(tree, new - 1, new, length)
+        tree.counters[CONSIDERED] += 1
+        tree.counters[VERTICES] = new + 1
+        if distance_to_goal(tree, options, new) == 0.0:
+            tree.counters[GOAL] = new
+
+
+@kernel
 def grow(surface, space, tree, options, draws):
     """Algorithm 2: draw len(draws) samples. draws (m, 3): uniform numbers in [0, 1).
 
-    The first call makes the start the tree's first vertex.
+    The first call makes the start the tree's first vertex, and hangs the first branch below it.
     """
     if tree.counters[VERTICES] == 0:
         plant(surface, tree, options)
+        hang_branch(surface, space, tree, options)
     for m in range(draws.shape[0]):
         tree.counters[SAMPLES] += 1
         x, y, worthwhile = sample(surface, tree, options, draws[m])
-        grew = worthwhile and extend(surface, space, tree, options, x, y)
-        if not grew:
-            tree.counters[STRAIGHT] = 0
-        elif tree.counters[GOAL] < 0:
+        is_beside = is_beside_path(tree, options, draws[m])
+        grew = worthwhile and extend(surface, space, tree, options, x, y, is_beside)
+        if grew and tree.counters[GOAL] < 0:
             join_goal(surface, space, tree, options)

@@ -5,7 +5,7 @@ import math
 from ..compiler import inner_kernel, kernel
 from ..surface.surfaces import spot_at, value_at
 from .buckets import squared_distance
-from .tree import COST, GOAL, LIFTED, STRAIGHT, VERTICES, X, Y
+from .tree import COST, GOAL, LIFTED, VERTICES, X, Y
 
 # Share of the samples of an informed tree that are drawn near the best path. With half of them
 # the tree has too few vertices elsewhere, and too often keeps to the first valley it found.
@@ -101,26 +101,31 @@ def point_by_path(tree, options, share, offset):
     return p[X] + along * dx - across * dy, p[Y] + along * dy + across * dx
 
 
+@inner_kernel
+def is_beside_path(tree, options, draw):
+    """Is the sample of these uniform numbers (3,) one of those near the best path?"""
+    return options.informed and tree.counters[GOAL] >= 0 and draw[0] < PATH_SHARE
+
+
 @kernel
 def sample(surface, tree, options, draw):
     """A point to extend towards, and whether it can improve the path.
 
     draw (3,): uniform numbers in [0, 1). Until the goal is in the tree, a share ``goal_bias``
-    of the samples is the goal; an informed tree begins with the goal alone, as long as it grows
-    straight towards it. After that, a share of the informed samples is drawn near the best path
-    (Akgun and Stilman 2011), and the others in the ellipse that holds all better paths. Samples
-    that the chord rules out are dropped (Gammell, Srinivasa and Barfoot 2014, with the chord in
-    place of the distance).
+    of the samples is the goal. After that, a share of the informed samples is drawn near the best
+    path (Akgun and Stilman 2011), and the others in the ellipse that holds all better paths.
+    Samples that the chord rules out are dropped (Gammell, Srinivasa and Barfoot 2014, with the
+    chord in place of the distance).
     """
     width, height = options.x1 - options.x0, options.y1 - options.y0
     x, y = options.x0 + draw[1] * width, options.y0 + draw[2] * height
     if tree.counters[GOAL] < 0:
-        if tree.counters[STRAIGHT] or draw[0] < options.goal_bias:
+        if draw[0] < options.goal_bias:
             x, y = options.goal_x, options.goal_y
         return x, y, True
     if not options.informed:
         return x, y, True
-    if draw[0] < PATH_SHARE:
+    if is_beside_path(tree, options, draw):
         x, y = point_by_path(tree, options, draw[1], 2.0 * draw[2] - 1.0)
     elif area_to_search(tree, options) < width * height:
         x, y = point_of_ellipse(tree, options, draw[1], draw[2])

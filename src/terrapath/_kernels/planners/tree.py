@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
-from ..surface.lengths import composite_boole, norm
+from ..surface.lengths import composite_boole, norm, segment_length
 from ..surface.surfaces import Metric, plus_layer, slope_at, spot_at, times_cost
 from .buckets import Buckets
 
@@ -21,8 +21,7 @@ INTEGRATED = 5  # edges measured by Line-R
 CHECKED = 6  # edges tested against obstacles
 REWIRED = 7  # edges replaced by a better one
 LAID_OUT = 8  # vertices when they were last sorted into the buckets
-STRAIGHT = 9  # 1 as long as the tree is growing straight from the start to the goal
-COUNTERS = 10
+COUNTERS = 9
 
 
 # Entries of a row of Tree.places: what the search for neighbours reads of a vertex.
@@ -45,11 +44,12 @@ LINK = record(
 # A candidate edge between the newest vertex and one near it.
 CANDIDATE = record(
     ("squared", np.float64),  # planar distance squared
-    ("chord", np.float64),
+    ("chord", np.float64),  # no path along the edge is shorter
     ("cost", np.float64),  # of the other vertex, before this extension
     ("length", np.float64),  # negative where not yet measured
     ("vertex", np.int32),
     ("free", np.int32),  # 1 free, 0 blocked, -1 not yet tested
+    ("refined", np.int64),  # 1 where the chord is a sum of short ones
 )
 
 
@@ -65,6 +65,7 @@ class Tree(NamedTuple):
     counters: np.ndarray  # (COUNTERS,) int64, 0 before the tree is planted
     buckets: Buckets
     floor: float  # no cost of the surface is below it
+    branch: np.ndarray  # (m, 2) float64: the first branch, from start to goal; m = 0 for none
     near: np.ndarray  # (n,) CANDIDATE: workspace
     queue: np.ndarray  # (n,) int32: workspace
 
@@ -83,7 +84,8 @@ class Options(NamedTuple):
     step: float
     radius: float  # the near radius is radius * sqrt(area * log(n) / n), at most the step
     goal_bias: float
-    panel: float  # longest piece that one application of Line-R measures
+    panel: float  # longest piece that one application of a rule measures
+    tolerance: float  # of an edge on rough ground, as a share of its length; 0 for Line-R
     riemannian: bool  # edges measured by Line-R; otherwise by the chord
     prune: bool
     informed: bool
@@ -135,6 +137,19 @@ def edge_length(surface, graph, a, b, panel):
 
 
 @kernel
+def careful_length(surface, graph, options, a, b):
+    """Length of the edge between two vertices: by Line-R, or on rough ground adaptively.
+
+    There the nodes of Line-R would miss much; pieces are halved until two rules agree.
+    """
+    if options.tolerance == 0.0:
+        return edge_length(surface, graph, a, b, options.panel)
+    p, q = graph.places[a], graph.places[b]
+    panel, tolerance = options.panel, options.tolerance
+    return segment_length(surface, p[X], p[Y], q[X], q[Y], panel, tolerance)
+
+
+@kernel
 def place(surface, tree, new, x, y):
     """Write what is stored of a vertex's position; it is not in the tree yet."""
     survey(surface, tree, new, x, y)
@@ -155,7 +170,6 @@ def plant(surface, tree, options):
     tree.buckets.frame[1] = options.y0
     tree.counters[GOAL] = -1
     tree.counters[VERTICES] = 1
-    tree.counters[STRAIGHT] = options.informed
 
 
 @kernel

@@ -61,6 +61,21 @@ def chord(surface, ax, ay, bx, by):
     return floor_of(surface) * math.sqrt(total)
 
 
+@kernel
+def chord_through(surface, ax, ay, bx, by, longest):
+    """The sum of the chords of a segment's pieces, each at most ``longest`` on the plane.
+
+    Never above the segment's length; on rough ground far nearer to it than the chord is.
+    """
+    pieces = max(math.ceil(math.hypot(bx - ax, by - ay) / longest), 1)
+    dx, dy = (bx - ax) / pieces, (by - ay) / pieces
+    length = 0.0
+    for k in range(pieces):
+        x, y = ax + k * dx, ay + k * dy
+        length += chord(surface, x, y, x + dx, y + dy)
+    return length
+
+
 # Patterson's nested rules on [-1, 1] (1968) with 3, 7 and 15 points, exact for degrees 5, 11
 # and 23. Each rule contains the nodes of the one before it. So short segments need only seven
 # evaluations, and for others none of the seven is wasted. Listed is the lower half of the nodes;

@@ -1,0 +1,56 @@
+"""The path over a lattice that an informed tree begins with where the straight line is no good."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from ..problem import Path, Problem
+from .base import INTERRUPT, Callback, FirstPath, Progress, TreeOptions
+from .grid_search import AStar
+
+# The first lattice has between so many nodes on a side, so that it shows valleys and gaps, and so
+# many, so that it costs no more than the default number of samples. They cost more on rough ground.
+FEWEST_NODES, MOST_NODES, MOST_ON_ROUGH = 100, 200, 500
+
+# The neighbours of a node. With fewer a search is hardly quicker, and oftener in a wrong valley.
+NEIGHBOURS = 32
+
+TIME_LIMIT = "time limit"
+
+
+def coarse_spacing(problem: Problem, is_rough: bool = False) -> float:
+    """The spacing of the first lattice, map units: a cell or a feature, as far as that is cheap."""
+    side = problem.bounds.side
+    cells = (min(mask.spacing) for mask in problem.free_space.masks)
+    finest = min(problem.surface.resolution, side / FEWEST_NODES, *cells)
+    return max(finest, side / (MOST_ON_ROUGH if is_rough else MOST_NODES))
+
+
+def path_over_lattices(
+    problem: Problem,
+    options: TreeOptions,
+    callback: Callback | None,
+    straight: Path | None,
+    is_rough: bool,
+) -> FirstPath:
+    """The shortest path over a coarse lattice; where that shows none, over the default ones.
+
+    straight : the straight line where that is free; the shorter path counts. The coarse lattice
+    takes a moment, so only the others show their progress.
+    """
+    coarse = AStar(spacing=coarse_spacing(problem, is_rough), neighbours=NEIGHBOURS)
+    found = coarse.solve(problem, time_limit=options.time_limit)
+    seconds = found.seconds
+
+    def watch(progress: Progress) -> bool:
+        seen = Progress(0, options.samples, seconds + progress.seconds, math.inf)
+        return callback is not None and bool(callback(seen))
+
+    if found.path is straight is None and found.stopped_by not in (INTERRUPT, TIME_LIMIT):
+        rest = None if options.time_limit is None else max(options.time_limit - seconds, 1e-9)
+        found = replace(coarse, spacing=None).solve(problem, callback=watch, time_limit=rest)
+        seconds += found.seconds
+    paths = [path for path in (found.path, straight) if path is not None]
+    ended = found.stopped_by if found.stopped_by in (INTERRUPT, "callback") else ""
+    return FirstPath(min(paths, key=lambda path: path.length, default=None), seconds, ended)
