@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..space.free_space import FreeSpace
 from ..space.lattice import Lattice
 from ..surface import Surface
+from ..surface.metric import feature_size
 from ..validation import Array, PointLike
 
 if TYPE_CHECKING:
@@ -171,7 +172,8 @@ class Medium:
 
 def _sample(surface: Surface, lattice: Lattice) -> ground.Ground:
     """Heights and costs between and at the nodes."""
-    features = max(lattice.dx, lattice.dy) / surface.resolution
+    size = feature_size(surface)
+    features = max(lattice.dx / size[0], lattice.dy / size[1])
     pieces = min(max(math.ceil(features - 1e-9), 1), MOST_PIECES)
     per = 2 * pieces
     grid = lattice.data._replace(

@@ -16,7 +16,7 @@ from ..geodesics.alternatives import is_same, routes_of_fields, shortest
 from ..geodesics.refinement import refine
 from ..geodesics.visibility import is_flat, shortest_taut_path
 from ..problem import Path, Problem, Solution, Status
-from ..space.lattice import Lattice
+from ..space.lattice import Lattice, Spacing
 from ..surface.bounds import Bounds
 from ..validation import require_count, require_positive
 from .base import (
@@ -224,9 +224,9 @@ class _Run:
     def try_finer_fields(self) -> None:
         """Fields on ever finer lattices, where a shorter route could lead."""
         lattice = self.fields[0].lattice
-        spacing = max(lattice.dx, lattice.dy)
+        spacing = lattice.spacing
         while math.isfinite(self.best) and not self.must_stop():
-            spacing *= 0.5
+            spacing = Spacing(0.5 * spacing.x, 0.5 * spacing.y)
             lattice = Lattice.spanning(self.window(), spacing)
             before = self.best
             if lattice.nx * lattice.ny > MOST_NODES or not self.try_fields_on(lattice, 1):

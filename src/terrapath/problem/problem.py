@@ -13,7 +13,7 @@ import numpy.typing as npt
 from .._kernels.surface.surfaces import Spline
 from ..errors import BlockedError, InputError, OutsideSurfaceError
 from ..space.free_space import FreeSpace, Obstacle
-from ..space.lattice import Cells, default_spacing
+from ..space.lattice import Cells, Spacing, default_spacing
 from ..surface import Mask, Surface, metric
 from ..surface.bounds import Bounds, as_bounds
 from ..validation import Point, PointLike, as_point, require_not_negative
@@ -164,10 +164,11 @@ class Problem:
         return self.free_space.allows(points)
 
     @property
-    def default_spacing(self) -> float:
-        """The default spacing of lattice nodes, map units."""
-        finest = [self.surface.resolution, *(min(mask.spacing) for mask in self.free_space.masks)]
-        return default_spacing(self.bounds, min(finest))
+    def default_spacing(self) -> Spacing:
+        """The default spacing of lattice nodes along x1 and x2, map units."""
+        finest = [metric.feature_size(self.surface)]
+        finest += [mask.spacing for mask in self.free_space.masks]
+        return default_spacing(self.bounds, Spacing(*map(min, zip(*finest, strict=True))))
 
     @property
     def cells(self) -> Cells | None:

@@ -31,13 +31,23 @@ class Cells(NamedTuple):
     dy: float
 
 
-def default_spacing(bounds: Bounds, resolution: float) -> float:
-    """The default spacing of nodes, map units.
+class Spacing(NamedTuple):
+    """The distance of nodes, or the size of cells or features, along x1 and x2, map units."""
 
-    resolution : the size of the surface's finest features, map units.
-    """
-    side = max(bounds.width, bounds.height)
-    return max(min(side / NODES_PER_SIDE, resolution), side / MOST_NODES_PER_SIDE)
+    x: float
+    y: float
+
+
+def default_spacing(bounds: Bounds, features: Spacing) -> Spacing:
+    """The default spacing of nodes. features : the size of the finest ones."""
+    if features.x == features.y:
+        side, unit = max(bounds.width, bounds.height), Spacing(1.0, 1.0)
+        finest = features.x
+    else:  # in units of features
+        side, unit = max(bounds.width / features.x, bounds.height / features.y), features
+        finest = 1.0
+    share = max(min(side / NODES_PER_SIDE, finest), side / MOST_NODES_PER_SIDE)
+    return Spacing(share * unit.x, share * unit.y)
 
 
 @dataclass(frozen=True)
@@ -52,27 +62,28 @@ class Lattice:
     ny: int
 
     @classmethod
-    def spanning(cls, bounds: Bounds, spacing: float) -> Lattice:
+    def spanning(cls, bounds: Bounds, spacing: float | Spacing) -> Lattice:
         """The lattice with the fewest nodes that are at most ``spacing`` map units apart.
 
         Raises InputError where that is more nodes than can be numbered.
         """
-        require_positive(spacing=spacing)
-        if max(bounds.width, bounds.height) / spacing > MOST_NODES:
+        step = spacing if isinstance(spacing, Spacing) else Spacing(spacing, spacing)
+        require_positive(spacing=min(step))
+        if max(bounds.width / step.x, bounds.height / step.y) > MOST_NODES:
             raise InputError(
-                f"spacing={spacing:g} makes more than {MOST_NODES:,} nodes; give a wider one"
+                f"spacing={min(step):g} makes more than {MOST_NODES:,} nodes; give a wider one"
             )
-        nx = max(math.ceil(bounds.width / spacing - 1e-9), 1) + 1
-        ny = max(math.ceil(bounds.height / spacing - 1e-9), 1) + 1
+        nx = max(math.ceil(bounds.width / step.x - 1e-9), 1) + 1
+        ny = max(math.ceil(bounds.height / step.y - 1e-9), 1) + 1
         if nx * ny > MOST_NODES:
             raise InputError(
-                f"spacing={spacing:g} makes {nx:,} x {ny:,} nodes, more than {MOST_NODES:,}; "
+                f"spacing={min(step):g} makes {nx:,} x {ny:,} nodes, more than {MOST_NODES:,}; "
                 "give a wider one"
             )
         return cls(bounds, nx, ny)
 
     @classmethod
-    def at_cells(cls, bounds: Bounds, spacing: float, cells: Cells) -> Lattice:
+    def at_cells(cls, bounds: Bounds, spacing: float | Spacing, cells: Cells) -> Lattice:
         """The lattice with nodes at the centres of cells, at most ``spacing`` map units apart.
 
         Where cells are larger than the spacing there are nodes between the centres; where they are
@@ -81,11 +92,17 @@ class Lattice:
         Raises as ``spanning`` does.
         """
         spanning = cls.spanning(bounds, spacing)
-        low_x, high_x, nx = _centres(bounds.x1_min, bounds.x1_max, spacing, cells.x, cells.dx)
-        low_y, high_y, ny = _centres(bounds.x2_min, bounds.x2_max, spacing, cells.y, cells.dy)
+        step = spacing if isinstance(spacing, Spacing) else Spacing(spacing, spacing)
+        low_x, high_x, nx = _centres(bounds.x1_min, bounds.x1_max, step.x, cells.x, cells.dx)
+        low_y, high_y, ny = _centres(bounds.x2_min, bounds.x2_max, step.y, cells.y, cells.dy)
         if min(nx, ny) < 2 or nx * ny > MOST_NODES:
             return spanning
         return cls(Bounds(low_x, low_y, high_x, high_y), nx, ny)
+
+    @property
+    def spacing(self) -> Spacing:
+        """Distance of neighbouring nodes, map units."""
+        return Spacing(self.dx, self.dy)
 
     @property
     def dx(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.surface import lengths
-from .._kernels.surface.surfaces import fill_metric
+from .._kernels.surface.surfaces import Peaks, fill_metric
 from ..errors import InputError
 from ..validation import Array, as_points
 from . import Surface
@@ -152,3 +152,12 @@ def is_rough(surface: Surface, bounds: Bounds) -> bool:
     shortest = ROUGH_FEATURES * surface.resolution
     lengths.fill_segment_lengths(surface.data, a, b, shortest, ROUGH_TOLERANCE, adaptive)
     return bool(np.abs(once - adaptive).sum() > ROUGH * adaptive.sum())
+
+
+def feature_size(surface: Surface) -> tuple[float, float]:
+    """The size of the surface's finest features along x1 and x2, map units."""
+    data, size = surface.data, surface.resolution
+    if isinstance(data, Peaks) or math.isinf(size):
+        return size, size
+    shorter = min(data.dx, data.dy)
+    return size * (data.dx / shorter), size * (data.dy / shorter)

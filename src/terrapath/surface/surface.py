@@ -216,7 +216,7 @@ class Surface:
             fitted.value_error,
             smoothing=fitted.smoothing,
         )
-        spacing = float(max(np.diff(x).max(), np.diff(y).max()))
+        spacing = float(min(np.diff(x).max(), np.diff(y).max()))
         resolution = spacing if fitted.smoothing is None else fitted.smoothing.resolution(spacing)
         data = with_costs(fitted.spline, logs)
         return cls(data, rises, bounds, fit, resolution, nodata, georeference, costs, logs)
