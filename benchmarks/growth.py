@@ -44,7 +44,7 @@ GROUND: dict[str, Callable[[], Problem]] = {
 }
 
 
-def options_on(ground: str) -> dict[str, bool]:
+def options_on(ground: str) -> dict[str, Any]:
     """The planner's options; without the default ones samples are drawn everywhere."""
     return {} if ground == DEFAULTS else {"informed": False}
 

@@ -62,7 +62,8 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     # the area that is searched, which is at least that of the free space in it.
     least = 2.0 * math.sqrt(1.5 / math.pi)
     panel, tolerance = options.panel or FEATURES_PER_PANEL * problem.surface.resolution, 0.0
-    if options.panel is None and options.informed and is_rough(problem.surface, bounds):
+    is_open = options.panel is None and options.informed and options.riemannian
+    if is_open and is_rough(problem.surface, bounds):
         panel, tolerance = ROUGH_FEATURES * problem.surface.resolution, ROUGH_TOLERANCE
     return trees.Options(
         *bounds,
@@ -229,10 +230,7 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
 def _first_path(
     problem: Problem, options: TreeOptions, callback: Callback | None, is_rough: bool
 ) -> FirstPath:
-    """What an informed tree begins with; other trees begin with nothing.
-
-    It is the straight line where that is free and cheap, else a path over a lattice.
-    """
+    """What an informed tree begins with: the straight line if cheap, else a path over a lattice."""
     if not options.informed:
         return FirstPath(None)
     started, straight = time.perf_counter(), straight_path(problem)
