@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 import shapely
 
+from .._support.watching import MustStop, never
 from ..distance.field import DistanceField, Medium, march_from
 from ..errors import tell_unfinished
 from ..problem import Path, Problem
@@ -79,25 +80,28 @@ def routes_of_fields(
     count: int,
     *,
     failed: Callable[[Exception], object],
-    must_stop: Callable[[], bool] | None = None,
+    must_stop: MustStop = never,
+    is_late: MustStop = never,
 ) -> Iterator[Path]:
     """Distinct routes, each as soon as it is refined; the path down the fields comes first.
 
     from_start, from_goal : distance fields on one lattice. count : routes that are asked for; more
     are tried, because a later one may be shorter. failed : is called with the error where a
     route cannot be refined. must_stop : is asked after each candidate whether to end the search.
+    is_late : is asked many times a second; when it says True, the route in hand is not refined
+    any further.
     """
     found: list[Path] = []
     for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
         try:
-            route = refine(problem, candidate)
+            route = refine(problem, candidate, must_stop=is_late)
         except Exception as error:
             failed(error)
         else:
             if not any(_is_same(problem, route, other) for other in found):
                 found.append(route)
                 yield route
-        if tries >= TRIES * count or (must_stop is not None and must_stop()):
+        if tries >= TRIES * count or must_stop():
             break
 
 

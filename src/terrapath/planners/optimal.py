@@ -30,8 +30,7 @@ class Optimal:
     target_gap : (length - lower bound) / lower bound to reach. routes : how many locally
     shortest routes to look for. The shortest is the path, the others are its alternatives.
     spacing : of the nodes on which routes are searched, map units; by default a 250th of the
-    region's longer side, or a cell of the map where that is less. time_limit : seconds, checked
-    between the stages.
+    region's longer side, or a cell of the map where that is less. time_limit : seconds.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
     field; it is also the path returned where the run ends before a route was refined.
@@ -95,10 +94,16 @@ class _Run:
         if solution.path is None or self.stopper.stopped_by:
             return solution
         target = self.planner.target_gap
-        solution = with_bound(solution, target_gap=target, callback=self.stopper.must_stop)
+        solution = with_bound(
+            solution,
+            target_gap=target,
+            time_limit=self.stopper.seconds_left,
+            callback=self.stopper.must_stop,
+        )
         if solution.status is Status.INTERRUPTED:
             return solution
         met = solution.gap is not None and solution.gap <= target
+        self.stopper.is_late()
         reason = "gap met" if met else self.stopper.stopped_by or "finest lattice"
         return replace(solution, stopped_by=reason)
 
@@ -138,6 +143,7 @@ class _Run:
                 count,
                 failed=failures.append,
                 must_stop=self.must_stop,
+                is_late=self.stopper.is_late,
             ):
                 if failures and not found:
                     # The first route could not be refined, but it is a path all the same.
