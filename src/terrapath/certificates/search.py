@@ -222,6 +222,8 @@ def certificates(
             if search.likely_norm - 1.0 > 0.7 * (before - 1.0):
                 break
         yield search.certify()
+        if must_stop():
+            return
 
 
 def lower_bound(
@@ -269,8 +271,6 @@ def _best(
         if length - best.value <= target_gap * best.value:
             break
         if watch is not None and watch(best):
-            break
-        if must_stop():
             break
     assert best is not None
     return best
