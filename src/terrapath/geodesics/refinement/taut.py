@@ -50,7 +50,7 @@ def taut_paths(
     Where it must stop, the next one is as far as the path is pulled.
     """
     surface, space = problem.surface, problem.free_space
-    cleared = _cleared(space, points)
+    cleared = _cleared(space, points, must_stop)
     if cleared is None:
         return
     around, points = cleared
@@ -61,7 +61,7 @@ def taut_paths(
         longest = min(longest, length / FEWEST_PIECES)
         band = adopted(around, subdivided(band, longest))
         band = tightened(surface, around, band, must_stop)
-        while not must_stop() and (finer := _with_finer_discs(space, around, band)) is not None:
+        while (finer := _with_finer_discs(space, around, band, must_stop)) is not None:
             around, band = finer
             band = tightened(surface, around, subdivided(band, longest), must_stop)
         band = _pruned(around, band)
@@ -96,18 +96,22 @@ def _with_ends(problem: Problem, points: Array) -> Array:
 # Discs
 
 
-def _cleared(space: FreeSpace, points: Array) -> tuple[Surroundings, Array] | None:
+def _cleared(
+    space: FreeSpace, points: Array, must_stop: MustStop
+) -> tuple[Surroundings, Array] | None:
     """The surroundings of a path, and the path moved clear of what it grazes.
 
     The clearance is the largest one that the path keeps or can be moved to keep; None where even
-    the smallest one leaves no room.
+    the smallest one leaves no room, or where it must stop.
     """
     largest = float(np.abs(space.bounds).max())
     widest = max(CLEARANCE * space.bounds.side, LEAST_CLEARANCE * largest)
     for attempt in range(CLEARANCE_ATTEMPTS):
         clearance = widest * 0.1**attempt
         sides = np.array([_sides_clear_of(points, c, clearance) for c in space.circles], int)
-        around = surroundings(space, clearance, sides)
+        around = surroundings(space, clearance, sides, must_stop)
+        if around is None:
+            return None
         cleared = points if is_clear(around, points) else moved_clear(space, around, points)
         if cleared is not None:
             return around, cleared
@@ -128,12 +132,12 @@ def _sides_clear_of(points: Array, circle: Circle, clearance: float) -> int:
 
 
 def _with_finer_discs(
-    space: FreeSpace, around: Surroundings, band: Band
+    space: FreeSpace, around: Surroundings, band: Band, must_stop: MustStop
 ) -> tuple[Surroundings, Band] | None:
     """Surroundings with four times the sides around the discs that the path bends round.
 
     A coarse corner is replaced by four that lie behind it, and the path is pulled onto them. None
-    where no disc that the path touches can have more sides.
+    where no disc that the path touches can have more sides, or where it must stop.
     """
     band = _pruned(around, band)
     touched = np.unique(around.discs[band.bends])
@@ -143,7 +147,9 @@ def _with_finer_discs(
         return None
     sides = around.sides.copy()
     sides[grown] *= 4
-    finer = surroundings(space, float(around.clearance[0]), sides)
+    finer = surroundings(space, float(around.clearance[0]), sides, must_stop)
+    if finer is None:
+        return None
     plain = int((around.discs[:-1] == NONE).sum())
     old_first = plain + np.concatenate([[0], np.cumsum(around.sides)])
     new_first = plain + np.concatenate([[0], np.cumsum(sides)])
