@@ -60,6 +60,7 @@ def solvers_loaded_with(module):
 def test_the_checker_shares_nothing_with_the_solver():
     assert imports_of(certificate) == {
         "_support.files",
+        "_support.watching",
         "certificates.claims",
         "errors",
         "problem",
@@ -69,6 +70,7 @@ def test_the_checker_shares_nothing_with_the_solver():
     assert imports_of(claims) == {
         "_kernels.certificates.norms",
         "_kernels.surface.surfaces",
+        "_support.watching",
         "errors",
         "problem",
         "space.lattice",

@@ -531,10 +531,12 @@ def test_how_often_the_clock_is_looked_at_changes_nothing(name, chunk, problem, 
 def test_a_time_limit_and_a_callback_end_the_search(name, problem):
     by_time = tp.plan(problem, name, spacing=0.05, time_limit=1e-9)
     by_callback = tp.plan(problem, name, spacing=0.05, callback=lambda progress: True)
-    for solution, reason in ((by_time, "time limit"), (by_callback, "callback")):
+    chunk = grid_search.CHUNK
+    stopped = (by_time, "time limit", 0), (by_callback, "callback", chunk)
+    for solution, reason, samples in stopped:
         assert solution.status is tp.Status.NOT_FOUND
         assert solution.stopped_by == reason
-        assert solution.samples == grid_search.CHUNK
+        assert solution.samples == samples
         assert solution.path is None
 
 

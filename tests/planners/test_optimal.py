@@ -122,11 +122,11 @@ def raising(monkeypatch):
     def patch(error, *candidates):
         refine, calls = alternatives.refine, []
 
-        def refine_or_raise(problem, path):
+        def refine_or_raise(problem, path, **limits):
             calls.append(path)
             if len(calls) in candidates:
                 raise error
-            return refine(problem, path)
+            return refine(problem, path, **limits)
 
         monkeypatch.setattr(alternatives, "refine", refine_or_raise)
         monkeypatch.setattr(optimal, "SURE", np.inf)  # no other search follows

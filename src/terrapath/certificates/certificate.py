@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._support.files import written_whole
+from .._support.watching import MustStop, never
 from ..errors import CertificateError, MapError
 from ..problem import Problem
 from ..surface.bounds import as_bounds
@@ -151,13 +152,16 @@ def _hash(*parts: str | npt.ArrayLike) -> str:
     return digest.hexdigest()
 
 
-def certify(problem: Problem, proposal: Claim, found: Needs) -> Certificate:
+def certify(
+    problem: Problem, proposal: Claim, found: Needs, must_stop: MustStop = never
+) -> Certificate:
     """The certificate with the norm and the value that can be proven.
 
     proposal : whose norm and value are not proven yet. found : what the cells need. Where no norm
-    can be proven, the length of the straight line in R^n is the bound.
+    can be proven, the length of the straight line in R^n is the bound. Where it must stop, the
+    bound is what is proven so far.
     """
-    proven = proven_claim(problem, proposal, found)
+    proven = proven_claim(problem, proposal, found, must_stop)
     claimed = {field.name: getattr(proven, field.name) for field in fields(Claim)}
     made = Certificate(**claimed, fingerprint=fingerprint(problem))
     return replace(made, seal=seal_of(made))

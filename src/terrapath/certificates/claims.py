@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from .._kernels.certificates import norms as kernels
 from .._kernels.surface.surfaces import Peaks, Spline, fill_values
+from .._support.watching import MustStop, never
 from ..errors import CertificateError
 from ..problem import Problem
 from ..space.lattice import Lattice
@@ -32,6 +33,9 @@ EPSILONS = 64.0
 
 # A norm is proven to within this share of what samples of it suggest, and no closer.
 CLOSE = 3e-5
+
+# Cells proven between two looks at whether to stop.
+CHUNK = 32
 
 # The least norm: a function that is nearly flat proves nothing, and the squares of its slopes would
 # be rounded to 0.
@@ -193,48 +197,49 @@ class Needs(NamedTuple):
     slope: Array  # the largest dual norm of du at those points
 
 
-def cell_needs(problem: Problem, claim: Claim, enough: float) -> Needs:
+def cell_needs(problem: Problem, claim: Claim, enough: float, must_stop: MustStop = never) -> Needs:
     """For each cell an M that is enough.
 
     That is: in the cell the dual norm of du is at most M, or every path through it is long enough,
     by the chord from there to the goal. enough : where an M as low as this is proven, no lower one
-    is looked for.
+    is looked for; nor for the cells that are left where it must stop.
     """
     _require_fit(problem, claim)
-    lattice, ground = claim.lattice, _ground(problem)
-    found, likely, slope = np.empty((3, lattice.ny - 1, lattice.nx - 1))
-    kernels.fill_needs(
-        ground.surface,
-        _potential(problem, claim),
-        ground.goal,
-        float(claim.horizon),
-        exempt_cells(problem, claim),
-        float(enough) / (1.0 + ROUNDING),
-        _cutting(problem, lattice),
-        found,
-        likely,
-        slope,
-    )
+    lattice, ground, potential = claim.lattice, _ground(problem), _potential(problem, claim)
+    exempt, cutting = exempt_cells(problem, claim), _cutting(problem, lattice)
+    found, likely, slope = needs = np.empty((3, lattice.ny - 1, lattice.nx - 1))
+    given = (ground.surface, potential, ground.goal, float(claim.horizon))
+    for j in range(len(found)):
+        satisfied = math.inf if must_stop() else float(enough) / (1.0 + ROUNDING)
+        kernels.fill_needs(*given, j, exempt, satisfied, cutting, *needs)
     return Needs(found * (1.0 + ROUNDING), likely, slope)
 
 
-def proven_norm(problem: Problem, claim: Claim, found: Array, enough: float = 0.0) -> float:
+def proven_norm(
+    problem: Problem,
+    claim: Claim,
+    found: Array,
+    enough: float = 0.0,
+    must_stop: MustStop = never,
+) -> float:
     """The least M that is proven to be enough for all cells, or ``enough`` where that is more.
 
     found : (ny, nx), an M that is proven for each cell; the largest ones are improved first.
+    Where it must stop, the largest of those that are left is enough, too.
     """
-    ground = _ground(problem)
-    norm = kernels.least_norm(
-        ground.surface,
-        _potential(problem, claim),
-        ground.goal,
-        float(claim.horizon),
-        np.argsort(found, axis=None)[::-1],
-        found,
-        float(enough) / (1.0 + ROUNDING),
-        _cutting(problem, claim.lattice),
-    )
-    return float(norm) * (1.0 + ROUNDING)
+    ground, cutting = _ground(problem), _cutting(problem, claim.lattice)
+    given = (ground.surface, _potential(problem, claim), ground.goal, float(claim.horizon))
+    order, norm = np.argsort(found, axis=None)[::-1], float(enough) / (1.0 + ROUNDING)
+    for first in range(0, len(order), CHUNK):
+        largest = float(found.flat[order[first]])
+        if largest <= norm:
+            break
+        if must_stop():
+            norm = largest
+            break
+        cells = order[first : first + CHUNK]
+        norm = float(kernels.least_norm(*given, cells, found, norm, cutting))
+    return norm * (1.0 + ROUNDING)
 
 
 class End(NamedTuple):
@@ -358,14 +363,16 @@ def require_proven(problem: Problem, claim: Claim) -> None:
         )
 
 
-def proven_claim(problem: Problem, claim: Claim, found: Needs) -> Claim:
+def proven_claim(
+    problem: Problem, claim: Claim, found: Needs, must_stop: MustStop = never
+) -> Claim:
     """The claim with the norm and the value that can be proven.
 
     found : what its cells need. Where no norm can be proven, the length of the straight line in
-    R^n is the bound.
+    R^n is the bound. Where it must stop, the value is what is proven so far.
     """
     enough = max(float(found.likely.max()) * (1.0 + CLOSE), FLATTEST)
-    norm = proven_norm(problem, claim, found.proven, enough)
+    norm = proven_norm(problem, claim, found.proven, enough, must_stop)
     if not math.isfinite(norm):
         nothing = np.zeros_like(claim.coefficients)
         claim, norm = replace(claim, coefficients=nothing, horizon=0.0), 1.0

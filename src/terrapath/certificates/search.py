@@ -10,7 +10,6 @@ crosses, so the value at the goal falls very little.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
@@ -18,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from .._support.watching import MustStop, never, stop_after
 from ..distance.eikonal import Eikonal
 from ..distance.source import model_source, near_distance, window_radius
 from ..problem import Problem
@@ -122,11 +122,15 @@ def _repair_factors(found: Needs) -> Array:
 class Search:
     """The search for a lower bound on one lattice.
 
-    cap : larger distances do not matter, map units.
+    cap : larger distances do not matter, map units. Where it must stop, the field and the proof
+    are unfinished. The certificate holds all the same, but may be no more than the chord.
     """
 
-    def __init__(self, problem: Problem, lattice: Lattice, cap: float) -> None:
+    def __init__(
+        self, problem: Problem, lattice: Lattice, cap: float, must_stop: MustStop = never
+    ) -> None:
         self.problem, self.lattice, self.cap = problem, lattice, cap
+        self.must_stop = must_stop
         self.medium = Eikonal.around(problem.surface, lattice, _blocked_nodes(problem, lattice))
         self.model = model_source(
             lattice,
@@ -139,7 +143,7 @@ class Search:
         self._solve()
 
     def _solve(self) -> None:
-        u = self.medium.march(self.model, limit=self.cap)
+        u = self.medium.march(self.model, limit=self.cap, watch=lambda _: self.must_stop())
         cap = min(self.cap, float(u[np.isfinite(u)].max(initial=0.0)))
         self.proposal = Claim(
             value=0.0,
@@ -150,7 +154,7 @@ class Search:
             start_core=self.start_core,
             goal_core=self.goal_core,
         )
-        self.needs = cell_needs(self.problem, self.proposal, TOLERATED)
+        self.needs = cell_needs(self.problem, self.proposal, TOLERATED, self.must_stop)
 
     @property
     def likely_norm(self) -> float:
@@ -165,7 +169,7 @@ class Search:
 
     def certify(self) -> Certificate:
         """The certificate that the present field makes."""
-        return certify(self.problem, self.proposal, self.needs)
+        return certify(self.problem, self.proposal, self.needs, self.must_stop)
 
 
 def search_window(problem: Problem, length: float) -> Bounds:
@@ -192,28 +196,34 @@ def search_window(problem: Problem, length: float) -> Bounds:
 
 
 def certificates(
-    problem: Problem, length: float = math.inf, *, target_gap: float = 0.0
+    problem: Problem,
+    length: float = math.inf,
+    *,
+    target_gap: float = 0.0,
+    must_stop: MustStop = never,
 ) -> Iterator[Certificate]:
     """Certificates from ever finer lattices.
 
     length : of a path that is known, map units. target_gap : of the lower bound. The search goes
     on to the next finer lattice when the norm is too large by at most a quarter of the target
-    gap, or when a repair gains little.
+    gap, or when a repair gains little. Where it must stop, one last certificate comes at once.
     """
     window = search_window(problem, length)
     cap = length * (1.0 + 1e-6)
     for side in SIDES:
         spacing = max(window.width, window.height) / side
-        search = Search(problem, Lattice.spanning(window, spacing), cap)
+        search = Search(problem, Lattice.spanning(window, spacing), cap, must_stop)
         tolerable = 1.0 + max(0.25 * target_gap, 5e-5)
         for _ in range(REPAIRS):
             before = search.likely_norm
-            if before <= tolerable:
+            if before <= tolerable or must_stop():
                 break
             search.repair()
             if search.likely_norm - 1.0 > 0.7 * (before - 1.0):
                 break
         yield search.certify()
+        if must_stop():
+            return
 
 
 def lower_bound(
@@ -229,29 +239,30 @@ def lower_bound(
     length : of a path that is known, map units. With it the search leaves out ground that no
     shorter path can visit. target_gap : the search stops when (length - bound) / bound is no more
     than this; by default, and where no path is known, it stops after the first, coarsest lattice.
-    time_limit : seconds, checked between lattices. watch : is called with each certificate;
-    returning True stops the search.
-    Returns the best certificate found, which compares with numbers by its value.
+    time_limit : seconds. watch : is called with each certificate; returning True stops the search.
+    Returns the best certificate found, which compares with numbers by its value. Where time was up
+    before the first one was proven, its bound may be no more than the chord.
     Raises InputError for numbers that are not above 0.
     """
     _check(length, target_gap, time_limit)
-    deadline = time.perf_counter() + (math.inf if time_limit is None else time_limit)
+    must_stop = never if time_limit is None else stop_after(time_limit)
     # Overflow makes NaN, which proves nothing; so it needs no warning.
     with np.errstate(all="ignore"):
-        known = known_length(problem) if length is None else length
-        return _best(problem, known, target_gap, deadline, watch)
+        known = known_length(problem, must_stop) if length is None else length
+        return _best(problem, known, target_gap, must_stop, watch)
 
 
 def _best(
     problem: Problem,
     length: float,
     target_gap: float | None,
-    deadline: float,
+    must_stop: MustStop,
     watch: Watch | None,
 ) -> Certificate:
     """The best certificate found until there is a reason to stop."""
     best: Certificate | None = None
-    for found in certificates(problem, length, target_gap=target_gap or 0.0):
+    gap = target_gap or 0.0
+    for found in certificates(problem, length, target_gap=gap, must_stop=must_stop):
         if best is None or found.value > best.value:
             best = found
         # Without a known length there is no gap to reach.
@@ -260,8 +271,6 @@ def _best(
         if length - best.value <= target_gap * best.value:
             break
         if watch is not None and watch(best):
-            break
-        if time.perf_counter() > deadline:
             break
     assert best is not None
     return best
@@ -274,7 +283,7 @@ def _check(length: float | None, target_gap: float | None, time_limit: float | N
             require_positive(**{name: value})
 
 
-def known_length(problem: Problem) -> float:
+def known_length(problem: Problem, must_stop: MustStop = never) -> float:
     """The length of some path, map units; infinite where none is found on a coarse lattice."""
     from ..distance.field import march_from
     from ..distance.medium import Medium
@@ -282,5 +291,9 @@ def known_length(problem: Problem) -> float:
     spacing = max(problem.bounds.width, problem.bounds.height) / SIDES[0]
     lattice = Lattice.spanning(problem.bounds, spacing)
     medium = Medium(problem.surface, lattice, problem.free_space)
-    path = march_from(medium, problem.start).path_to(problem.goal)
+
+    def watch(settled: int) -> bool:
+        return must_stop()
+
+    path = march_from(medium, problem.start, watch=watch).path_to(problem.goal)
     return math.inf if path is None else path.length

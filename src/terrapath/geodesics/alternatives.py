@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from .._support.watching import MustStop, never
 from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
@@ -79,7 +80,8 @@ def routes_of_fields(
     *,
     margin: float = math.inf,
     failed: Callable[[Exception], object],
-    must_stop: Callable[[], bool] | None = None,
+    must_stop: MustStop = never,
+    is_late: MustStop = never,
 ) -> Iterator[Path]:
     """Distinct routes, each as soon as it is refined; the path down the fields comes first.
 
@@ -87,20 +89,22 @@ def routes_of_fields(
     are tried, because a later one may be shorter. margin : but none that the fields say are longer
     than the first by more than this share. failed : is called with the error where a
     route cannot be refined. must_stop : is asked after each candidate whether to end the search.
+    is_late : is asked many times a second; when it says True, the route in hand is not refined
+    any further.
     """
     found: list[Path] = []
     for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
         if len(found) >= count and candidate.excess > margin:
             break
         try:
-            route = refine(problem, candidate.path)
+            route = refine(problem, candidate.path, must_stop=is_late)
         except Exception as error:
             failed(error)
         else:
             if not any(is_same(problem, route, other) for other in found):
                 found.append(route)
                 yield route
-        if tries >= TRIES * count or (must_stop is not None and must_stop()):
+        if tries >= TRIES * count or must_stop():
             break
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.geodesics import equation as kernels, rays
+from .._support.watching import MustStop, never
 from ..errors import InputError
 from ..surface import Surface
 from ..surface.bounds import Bounds
@@ -328,8 +329,9 @@ def hit(
     *,
     bounds: Bounds,
     tolerance: float = TOLERANCE,
+    must_stop: MustStop = never,
 ) -> Geodesic | None:
-    """The geodesic between two rays that ends exactly at the goal; None where there is none.
+    """The geodesic between two rays that ends exactly at the goal; None where none is found.
 
     start, goal : (x1, x2), map units. between : where two rays that pass the goal on different
     sides come closest to it. tolerance : the largest error of a step. It is Newton's method for
@@ -355,7 +357,7 @@ def hit(
             angle, length, last_error = angle + turn, length + along, error
             continue
         angle, last_error = bracket.middle, math.inf
-        if not bracket.low < angle < bracket.high:
+        if must_stop() or not bracket.low < angle < bracket.high:
             return None
         miss = closest_approach(trace_ray(surface, start, angle, longest, **options), target)
         bracket.halve(miss.side, angle)

@@ -15,6 +15,9 @@ from ..validation import require_positive
 # Why a search was not needed: it is proven that there is no path.
 SEPARATED = "start and goal lie in different parts of the free space"
 
+# The least time limit, seconds: nothing that is asked for is begun, but all is ended in order.
+MOMENT = 1e-9
+
 # What stopped a search that Ctrl-C ended.
 INTERRUPT = "interrupt"
 
@@ -77,17 +80,22 @@ class Stopper:
 
     @property
     def seconds_left(self) -> float | None:
-        """Before the time limit, above 0; None where there is none."""
-        if self.time_limit is None:
-            return None
-        return max(self.time_limit - self.seconds, 1e-9)
+        """Until the time limit, at least a moment; None where there is no limit."""
+        return seconds_left(self.time_limit, self.seconds)
+
+    def is_late(self) -> bool:
+        """Is the time up? The callback is not asked."""
+        if self.time_limit is not None and self.seconds >= self.time_limit:
+            self.stopped_by = "time limit"
+            return True
+        return False
 
     def must_stop(self, progress: Progress) -> bool:
         """Show the progress to the callback and check the clock; once True, always True."""
         if self.callback is not None and self.callback(progress):
             self.stopped_by = "callback"
-        elif self.time_limit is not None and progress.seconds >= self.time_limit:
-            self.stopped_by = "time limit"
+        else:
+            self.is_late()
         return bool(self.stopped_by)
 
 
@@ -170,6 +178,11 @@ def least_limit(own: float | None, asked: float | None) -> float | None:
     if asked is not None:
         require_positive(time_limit=asked)
     return min((limit for limit in (own, asked) if limit is not None), default=None)
+
+
+def seconds_left(time_limit: float | None, used: float) -> float | None:
+    """What is left of a time limit; at least a moment, because limits are above 0."""
+    return None if time_limit is None else max(time_limit - used, MOMENT)
 
 
 def solve_within(

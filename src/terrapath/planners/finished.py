@@ -22,6 +22,7 @@ from .base import (
     Progress,
     least_limit,
     options_of,
+    seconds_left,
     solve_within,
 )
 
@@ -33,7 +34,8 @@ class Finished:
     refine : take the path to the locally shortest one. bound : prove a lower bound on the
     length of every path, on one coarse lattice. target_gap : improve the bound until
     (length - bound) / bound is no more than this; it implies ``bound``. time_limit : seconds
-    for the planner and the finishing together, checked between the lattices of a bound.
+    for the planner and the finishing together. When time is up, the solution has the path and
+    the bound that there are: a path refined in part, a bound that is no more than the chord.
 
     What the planner itself has refined or proven is not done again. An interrupted solution
     is left as it is. If the finishing fails, the planner's path is kept.
@@ -98,16 +100,20 @@ def finish(
 ) -> Solution:
     """A solution, refined and with a lower bound as asked; see ``Finished``."""
     if refine and solution.status is not Status.INTERRUPTED:
-        solution = refined(solution, callback=callback)
+        rest = seconds_left(time_limit, solution.seconds)
+        solution = refined(solution, time_limit=rest, callback=callback)
     if (bound or target_gap is not None) and solution.status is not Status.INTERRUPTED:
-        rest = None if time_limit is None else max(time_limit - solution.seconds, 1e-9)
+        rest = seconds_left(time_limit, solution.seconds)
         solution = with_bound(solution, target_gap=target_gap, time_limit=rest, callback=callback)
     return solution
 
 
-def refined(solution: Solution, *, callback: Callback | None = None) -> Solution:
+def refined(
+    solution: Solution, *, time_limit: float | None = None, callback: Callback | None = None
+) -> Solution:
     """The same solution with its path taken to the locally shortest one.
 
+    time_limit : seconds; when they are over, the path is the shortest one so far.
     ``cost`` stays what the planner returned; ``unrefined`` is the planner's own path.
     """
     problem, given = solution.problem, solution.path
@@ -116,7 +122,7 @@ def refined(solution: Solution, *, callback: Callback | None = None) -> Solution
     started, watcher = time.perf_counter(), _Watcher(callback)
     try:
         _announce(solution, REFINING, watcher)
-        path = refine(problem, given)
+        path = refine(problem, given, time_limit=time_limit)
     except KeyboardInterrupt:
         return _interrupted(solution)
     except Exception as error:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .._support.watching import MustStop
 from ..errors import InputError
 from ..geodesics.rays import (
     TOLERANCE,
@@ -160,7 +161,7 @@ class GeodesicTraversal:
         try:
             for angle in self._angles(problem):
                 misses.append(closest_approach(self._trace(problem, float(angle)), problem.goal))
-                found += self._hits(problem, misses[-2:])
+                found += self._hits(problem, misses[-2:], stopper.is_late)
                 best = min((geodesic.length for geodesic in found), default=math.inf)
                 seconds = stopper.seconds
                 if stopper.must_stop(Progress(len(misses), self.directions, seconds, best)):
@@ -170,7 +171,9 @@ class GeodesicTraversal:
         rays = tuple(miss.ray for miss in misses)
         return Fan(rays, tuple(misses), self._radius(problem), _distinct(found), interrupted)
 
-    def _hits(self, problem: Problem, neighbours: Sequence[Miss]) -> list[Geodesic]:
+    def _hits(
+        self, problem: Problem, neighbours: Sequence[Miss], must_stop: MustStop
+    ) -> list[Geodesic]:
         """The geodesic in free space between two rays that pass the goal on two sides, if any."""
         if len(neighbours) < 2 or not is_bracket(*neighbours):
             return []
@@ -181,6 +184,7 @@ class GeodesicTraversal:
             (neighbours[0], neighbours[1]),
             bounds=problem.bounds,
             tolerance=self.tolerance,
+            must_stop=must_stop,
         )
         return [geodesic] if geodesic is not None and _is_free(problem, geodesic) else []
 

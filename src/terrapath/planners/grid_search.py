@@ -167,23 +167,44 @@ class _Search:
     def progress(self) -> Progress:
         return Progress(self.settled, len(self.graph.vertices), self.seconds, self.best_cost)
 
+    @property
+    def is_late(self) -> bool:
+        return self.time_limit is not None and self.seconds >= self.time_limit
+
+    def relax_start(self) -> None:
+        """Relax the edges of the start, row by row: there are many where it sees no near node."""
+        _, _, first, last = self.nodes.joins[0]
+        for row in range(first, last + 2):
+            if self.is_late:
+                return
+            self.relax_row(row)
+
+    def relax_row(self, row: int) -> None:
+        """Relax the edges from the start to one row of its nodes; after the last, to the goal."""
+        surface, space = self.problem.surface.data, self.problem.free_space.data
+        kernels.relax_around_start(surface, space, self.nodes, self.graph, self.options, row)
+
     def advance(self, most: int) -> None:
         """Settle at most this many vertices."""
         surface, space = self.problem.surface.data, self.problem.free_space.data
         kernels.search(surface, space, self.nodes, self.graph, self.options, most)
 
     def sees_a_node(self, point: tuple[float, float], box: Integers) -> bool:
-        """Does a free segment lead from the point to a node of the box?
+        """Does a free segment lead from the point to a node of the box? No, where it is late.
 
         box : first and last column, first and last row.
         """
-        space = self.problem.free_space.data
-        return bool(kernels.any_node_is_near(space, self.nodes, box, *point))
+        space, (west, east, south, north) = self.problem.free_space.data, box
+        rows = (np.array([west, east, row, row]) for row in range(south, north + 1))
+        return any(
+            not self.is_late and kernels.any_node_is_near(space, self.nodes, row, *point)
+            for row in rows
+        )
 
     def join(self, end: int, point: tuple[float, float]) -> bool:
         """Join the start (0) or goal (1) to the nodes nearby, or else to those farther away.
 
-        False where no free segment leads to any node.
+        False where no free segment leads to any node, or where it is late.
         """
         reach = REACH[self.planner.neighbours]
         while True:
@@ -191,7 +212,7 @@ class _Search:
             if self.sees_a_node(point, box):
                 self.nodes.joins[end] = box
                 return True
-            if reach >= max(self.lattice.nx, self.lattice.ny):
+            if reach >= max(self.lattice.nx, self.lattice.ny) or self.is_late:
                 return False
             reach *= 2
 
@@ -232,9 +253,10 @@ def _prepare(
         direct=cells_apart <= REACH[planner.neighbours],
     )
     search = _Search(problem, planner, lattice, nodes, graph, options, time_limit)
-    kernels.begin(problem.surface.data, graph, options, *problem.start, *problem.goal)
+    kernels.begin(problem.surface.data, graph, *problem.start, *problem.goal)
     search.advance(0)
-    search.sees_a_node(problem.start, NO_NODES)
+    search.relax_row(-1)  # there is no such row
+    kernels.any_node_is_near(problem.free_space.data, nodes, NO_NODES, *problem.start)
     search.started = time.perf_counter()
     return search
 
@@ -245,12 +267,11 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
     stopped = callback is not None and callback(progress)
     if search.graph.vertices[search.goal]["slot"] == kernels.DONE:
         return "goal settled"
-    if search.graph.counters[kernels.OPEN] == 0:
+    if search.graph.counters[kernels.OPEN] == 0 and not search.is_late:
         return NO_WAY_ON
     if stopped:
         return "callback"
-    limit = search.time_limit
-    return "time limit" if limit is not None and progress.seconds >= limit else ""
+    return "time limit" if search.is_late else ""
 
 
 def _run(search: _Search, callback: Callback | None) -> str:
@@ -258,12 +279,16 @@ def _run(search: _Search, callback: Callback | None) -> str:
     problem = search.problem
     try:
         for end, point in enumerate((problem.start, problem.goal)):
-            if not search.join(end, point) and not search.options.direct:
+            is_joined = search.join(end, point) or search.options.direct
+            if not (is_joined or search.is_late):
                 return WITHOUT_PATH[1 + end]
+        search.relax_start()
+        most = CHUNK - search.settled  # the start is settled already
         while True:
-            search.advance(CHUNK)
+            search.advance(0 if search.is_late else most)
             if reason := _reason_to_stop(search, callback):
                 return reason
+            most = CHUNK
     except KeyboardInterrupt:
         return INTERRUPT
 

@@ -60,14 +60,13 @@ class Optimal:
     target_gap : (length - lower bound) / lower bound to reach. routes : how many locally
     shortest routes to look for. The shortest is the path, the others are its alternatives.
     spacing : of the nodes on which routes are searched first, map units; by default a 250th of the
-    region's longer side, or a cell of the map where that is less. time_limit : seconds, checked
-    between the stages.
+    region's longer side, or a cell of the map where that is less. time_limit : seconds.
 
     Candidates are the straight line, on flat ground the shortest path round the corners of
-    obstacles, and the routes of the distance fields from both ends. Where
-    the fields leave a doubt, on rough ground and among obstacles, fields on ever finer lattices
-    follow, A* with 32, 16 and 8 neighbours, and a tree. All are refined. The route from a start to
-    a goal is the same as back.
+    obstacles, and the routes of the distance fields from both ends. Where the fields leave a
+    doubt, on rough ground and among obstacles, fields on ever finer lattices follow, A* with 32, 16
+    and 8 neighbours, and a tree. All are refined. The route from a start to a goal is the same as
+    back.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
     field; it is also the path returned where the run ends before a route was refined.
@@ -252,7 +251,7 @@ class _Run:
     def refine(self, path: Path) -> None:
         """Refine a candidate and keep it; where that fails, keep it as it is."""
         try:
-            path = refine(self.problem, path)
+            path = refine(self.problem, path, must_stop=self.stopper.is_late)
         except Exception as error:
             self.failures.append(error)
         self.keep(path)
@@ -267,6 +266,7 @@ class _Run:
                 margin=MARGIN,
                 failed=self.failures.append,
                 must_stop=self.must_stop,
+                is_late=self.stopper.is_late,
             ):
                 self.keep(route)
         except Exception as error:
@@ -325,5 +325,6 @@ class _Run:
         if solution.status is Status.INTERRUPTED:
             return solution
         met = solution.gap is not None and solution.gap <= target
+        self.stopper.is_late()
         reason = "gap met" if met else self.stopper.stopped_by or "finest lattice"
         return replace(solution, stopped_by=reason)

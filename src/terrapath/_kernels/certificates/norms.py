@@ -278,27 +278,28 @@ def cheap_need(floor, potential, goal, horizon, i, j):
 
 
 @kernel
-def fill_needs(surface, potential, goal, horizon, exempt, enough, cutting, proven, likely, slope):
-    """A rough M that is enough for each cell (ny, nx); 0 where exempt.
+def fill_needs(
+    surface, potential, goal, horizon, j, exempt, enough, cutting, proven, likely, slope
+):
+    """A rough M that is enough for each cell of row j; 0 where exempt.
 
     enough : where this M is proven to be enough, no lower one is looked for.
     """
-    for j in range(proven.shape[0]):
-        for i in range(proven.shape[1]):
-            proven[j, i] = 0.0
-            if not exempt[j, i]:
-                proven[j, i] = cheap_need(floor_of(surface), potential, goal, horizon, i, j)
-            likely[j, i], slope[j, i] = proven[j, i], 0.0
-            if proven[j, i] > enough:
-                need = need_of_cell(surface, potential, goal, horizon, i, j, cutting)
-                proven[j, i] = min(proven[j, i], need.proven)
-                likely[j, i] = min(proven[j, i], need.likely)
-                slope[j, i] = need.slope
+    for i in range(proven.shape[1]):
+        proven[j, i] = 0.0
+        if not exempt[j, i]:
+            proven[j, i] = cheap_need(floor_of(surface), potential, goal, horizon, i, j)
+        likely[j, i], slope[j, i] = proven[j, i], 0.0
+        if proven[j, i] > enough:
+            need = need_of_cell(surface, potential, goal, horizon, i, j, cutting)
+            proven[j, i] = min(proven[j, i], need.proven)
+            likely[j, i] = min(proven[j, i], need.likely)
+            slope[j, i] = need.slope
 
 
 @kernel
 def least_norm(surface, potential, goal, horizon, order, needs, norm, cutting):
-    """The least M, at least ``norm``, that is enough for all cells.
+    """The least M, at least ``norm``, that is enough for some cells.
 
     needs (ny, nx) : an M that is proven to be enough for each cell. order : numbers of the cells,
     the largest need first, so that the cells that decide M come first.

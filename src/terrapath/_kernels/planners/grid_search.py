@@ -185,14 +185,19 @@ def relax(surface, space, nodes, graph, options, u, v):
 
 
 @kernel
-def relax_around_start(surface, space, nodes, graph, options, start):
-    """Relax the edges from the start to the nodes that it is joined to."""
-    box = nodes.joins[0]
-    for row in range(box[2], box[3] + 1):
+def relax_around_start(surface, space, nodes, graph, options, row):
+    """Relax the edges from the start to the nodes of one row that it is joined to.
+
+    The goal's edge comes after the last row; then the start is settled.
+    """
+    box, start = nodes.joins[0], graph.vertices.shape[0] - 2
+    if row <= box[3]:
         for column in range(box[0], box[1] + 1):
             relax(surface, space, nodes, graph, options, start, row * nodes.x.shape[0] + column)
+        return
     if options.direct:
         relax(surface, space, nodes, graph, options, start, start + 1)
+    graph.counters[SETTLED] += 1
 
 
 @kernel
@@ -219,20 +224,18 @@ def search(surface, space, nodes, graph, options, most):
         u = take_first(graph.vertices, graph.heap, graph.counters[OPEN])
         graph.counters[OPEN] -= 1
         graph.counters[SETTLED] += 1
-        if u == goal - 1:
-            relax_around_start(surface, space, nodes, graph, options, u)
-        elif u != goal:
+        if u != goal:
             relax_around_node(surface, space, nodes, graph, options, u, goal)
 
 
 @kernel
-def begin(surface, graph, options, start_x, start_y, goal_x, goal_y):
-    """Place start and goal, and put the start into the heap."""
+def begin(surface, graph, start_x, start_y, goal_x, goal_y):
+    """Place start and goal. The start is never in the heap: its edges are relaxed first of all."""
     goal = graph.vertices.shape[0] - 1
     place(surface, graph, goal, goal_x, goal_y)
     place(surface, graph, goal - 1, start_x, start_y)
     graph.places[goal - 1, COST] = 0.0
-    enter(graph, options, goal - 1)
+    graph.vertices[goal - 1].slot = DONE
 
 
 @kernel

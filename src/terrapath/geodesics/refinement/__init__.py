@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from ..._support.watching import MustStop, never, stop_after
 from ...errors import InputError, UnfinishedWarning, tell
 from ...problem import Path, Problem
 from ...surface import Surface
@@ -34,7 +35,14 @@ ROUNDING = 1e-12
 NO_ROOM = "a path could not be refined: obstacles leave no room to pull it taut; it stays as it was"
 
 
-def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = TOLERANCE) -> Path:
+def refine(
+    problem: Problem,
+    path: Path | npt.ArrayLike,
+    *,
+    tolerance: float = TOLERANCE,
+    time_limit: float | None = None,
+    must_stop: MustStop = never,
+) -> Path:
     """The locally shortest path near a path: what it becomes when it is pulled taut.
 
     path : Path or (m, 2) array, map units, from the problem's start to its goal through free
@@ -43,13 +51,18 @@ def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = T
     are enough. The path bends round obstacles at a distance of 1e-8 of the region's side, however
     near to them the path given passes. It is never longer than the path given, stays in free
     space, and passes each obstacle on the same side. Where obstacles leave no room to pull the
-    path taut, it is returned as it was, with an UnfinishedWarning.
+    path taut, it is returned as it was, with an UnfinishedWarning. time_limit : seconds.
+    must_stop : is asked many times a second whether to stop; from then on it must say True. Where
+    time is up, or it says so, the path is the best one so far.
     Raises InputError where the path does not join start and goal, or is not in free space.
     """
     require_positive(tolerance=tolerance)
+    if time_limit is not None:
+        require_positive(time_limit=time_limit)
+        must_stop = stop_after(time_limit, must_stop)
     given = problem.path(_checked(problem, path))
     best, is_pulled = given, given.length == 0.0
-    for points in _refined(problem, given, tolerance):
+    for points in _refined(problem, given, tolerance, must_stop):
         if not problem.allows(points):
             continue
         found, is_pulled = problem.path(points), True
@@ -57,7 +70,9 @@ def refine(problem: Problem, path: Path | npt.ArrayLike, *, tolerance: float = T
         longest = min(best.length * (1.0 + tolerance), given.length * (1.0 + ROUNDING))
         if found.length <= longest:
             best = found
-    if not is_pulled:
+        if must_stop():
+            break
+    if not is_pulled and not must_stop():
         tell(UnfinishedWarning(NO_ROOM))
     return best
 
@@ -110,19 +125,21 @@ def _require_free(problem: Problem, points: Array) -> None:
         )
 
 
-def _refined(problem: Problem, given: Path, tolerance: float) -> Iterator[Array]:
+def _refined(
+    problem: Problem, given: Path, tolerance: float, must_stop: MustStop
+) -> Iterator[Array]:
     """Polylines (m, 2) that may be shorter; the last is most likely the shortest."""
     space = problem.free_space
-    if given.length == 0.0:
+    if given.length == 0.0 or must_stop():
         return
     if not (space.geometries or space.circles or space.masks):
-        candidates = _geodesics(problem.surface, given, tolerance)
+        candidates = _geodesics(problem.surface, given, tolerance, must_stop)
         if all(problem.bounds.contains(points).all() for points in candidates):
             yield from candidates
             return
     from .taut import taut_paths
 
-    yield from taut_paths(problem, given.points, tolerance)
+    yield from taut_paths(problem, given.points, tolerance, must_stop)
 
 
 def _features(surface: Surface, given: Path) -> float:
@@ -151,14 +168,16 @@ def _along(points: Array, pieces: int) -> Array:
     return np.column_stack([np.interp(places, reached, axis) for axis in points.T])
 
 
-def _geodesics(surface: Surface, given: Path, tolerance: float) -> list[Array]:
+def _geodesics(surface: Surface, given: Path, tolerance: float, must_stop: MustStop) -> list[Array]:
     """The geodesic near a path, as a polyline (m, 2), as if there were no obstacles.
 
     Where the surface is too rough for the geodesic to be exact, the polyline of least energy comes
-    before it.
+    before it. Where it must stop, only the polyline as far as it is pulled.
     """
     stages = _stages(_features(surface, given))
-    polyline = shortest_polyline(surface, _along(given.points, stages[0]), stages)
+    polyline = shortest_polyline(surface, _along(given.points, stages[0]), stages, must_stop)
+    if must_stop():
+        return [polyline]
     corrected = correct(surface, polyline)
     curve = curve_through(polyline if corrected is None else corrected)
     points = curve(placed_parameters(surface, curve, stages[-1], tolerance))

@@ -17,6 +17,7 @@ import shapely
 
 from ..._kernels.geodesics import contacts as kernels
 from ..._kernels.geodesics.newton import Strand
+from ..._support.watching import MustStop, never
 from ...space.free_space import Indices
 from ...surface import Surface
 from ...validation import Array
@@ -249,11 +250,18 @@ def _slid_off(around: Surroundings, band: Band) -> Band:
     return replace(band, walls=walls)
 
 
-def tightened(surface: Surface, around: Surroundings, band: Band) -> Band:
-    """The band pulled taut: no move that obstacles allow shortens it."""
+def tightened(
+    surface: Surface, around: Surroundings, band: Band, must_stop: MustStop = never
+) -> Band:
+    """The band pulled taut: no move that obstacles allow shortens it.
+
+    Where it must stop, the band as far as it is pulled.
+    """
     releases: dict[int, int] = {}
     path = None
     for _ in range(MOST_ROUNDS):
+        if must_stop():
+            break
         if path is None or path.points is not band.points:
             path = lift(surface, band.points)
         found = lower(surface, path, projectors(around, band))

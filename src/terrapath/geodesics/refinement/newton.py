@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..._kernels.geodesics import newton as kernels
+from ..._support.watching import MustStop, never
 from ...surface import Surface
 from ...validation import Array
 from .curve import Curve, spline_through
@@ -164,11 +165,14 @@ def all_free(points: Array) -> Array:
     return np.tile(np.eye(2), (len(points) - 2, 1, 1))
 
 
-def settle(surface: Surface, points: Array) -> Array:
-    """The path of least energy near points (m, 2), with as many points, by Newton's method."""
+def settle(surface: Surface, points: Array, must_stop: MustStop = never) -> Array:
+    """The path of least energy near points (m, 2), with as many points, by Newton's method.
+
+    Where it must stop, the path so far.
+    """
     path, projectors = lift(surface, points), all_free(points)
     for _ in range(MOST_STEPS):
-        found = lower(surface, path, projectors)
+        found = None if must_stop() else lower(surface, path, projectors)
         if found is None:
             break
         path = found
@@ -180,15 +184,19 @@ def resample(points: Array, pieces: int) -> Array:
     return spline_through(points, 3)(np.linspace(0.0, 1.0, pieces + 1))
 
 
-def shortest_polyline(surface: Surface, points: Array, pieces: tuple[int, ...]) -> Array:
+def shortest_polyline(
+    surface: Surface, points: Array, pieces: tuple[int, ...], must_stop: MustStop = never
+) -> Array:
     """The locally shortest polyline near the one given, (m, 2), map units.
 
     pieces : numbers of pieces, from coarse to fine. The first stage starts from the points given,
-    each other one from the path of the stage before.
+    each other one from the path of the stage before. must_stop : ends it with the path so far.
     """
     for count in pieces:
+        if must_stop():
+            break
         finer = points if len(points) == count + 1 else resample(points, count)
-        points = settle(surface, finer)
+        points = settle(surface, finer, must_stop)
     return points
 
 

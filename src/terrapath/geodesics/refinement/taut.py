@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from ..._support.watching import MustStop
 from ...problem import Problem
 from ...space.free_space import Circle, FreeSpace, Indices
 from ...surface import Surface
@@ -38,10 +39,15 @@ STRAIGHT = 3e-3
 SMOOTHING_ROUNDS = 10
 
 
-def taut_paths(problem: Problem, points: Array, tolerance: float) -> Iterator[Array]:
-    """Polylines (m, 2) from the one given towards the taut path; each is closer to it."""
+def taut_paths(
+    problem: Problem, points: Array, tolerance: float, must_stop: MustStop
+) -> Iterator[Array]:
+    """Polylines (m, 2) from the one given towards the taut path; each is closer to it.
+
+    Where it must stop, the next one is as far as the path is pulled.
+    """
     surface, space = problem.surface, problem.free_space
-    cleared = _cleared(space, points)
+    cleared = _cleared(space, points, must_stop)
     if cleared is None:
         return
     around, points = cleared
@@ -50,15 +56,16 @@ def taut_paths(problem: Problem, points: Array, tolerance: float) -> Iterator[Ar
     for pieces in PIECES_PER_FEATURE:
         longest = max(surface.resolution / pieces, length / MOST_PIECES)
         longest = min(longest, length / FEWEST_PIECES)
-        band = tightened(surface, around, adopted(around, subdivided(band, longest)))
-        while (finer := _with_finer_discs(space, around, band)) is not None:
+        band = adopted(around, subdivided(band, longest))
+        band = tightened(surface, around, band, must_stop)
+        while (finer := _with_finer_discs(space, around, band, must_stop)) is not None:
             around, band = finer
-            band = tightened(surface, around, subdivided(band, longest))
+            band = tightened(surface, around, subdivided(band, longest), must_stop)
         band = _pruned(around, band)
         yield _tidied(problem, band.points)
-    band = _smoothed(surface, around, band)
+    band = _smoothed(surface, around, band, must_stop)
     yield _tidied(problem, band.points)
-    yield _tidied(problem, _placed(surface, around, band, tolerance))
+    yield _tidied(problem, _placed(surface, around, band, tolerance, must_stop))
 
 
 def _tidied(problem: Problem, points: Array) -> Array:
@@ -86,18 +93,22 @@ def _with_ends(problem: Problem, points: Array) -> Array:
 # Discs
 
 
-def _cleared(space: FreeSpace, points: Array) -> tuple[Surroundings, Array] | None:
+def _cleared(
+    space: FreeSpace, points: Array, must_stop: MustStop
+) -> tuple[Surroundings, Array] | None:
     """The surroundings of a path, and the path moved clear of what it grazes.
 
     The clearance is the largest one that the path keeps or can be moved to keep; None where even
-    the smallest one leaves no room.
+    the smallest one leaves no room, or where it must stop.
     """
     largest = float(np.abs(space.bounds).max())
     widest = max(CLEARANCE * space.bounds.side, LEAST_CLEARANCE * largest)
     for attempt in range(CLEARANCE_ATTEMPTS):
         clearance = widest * 0.1**attempt
         sides = np.array([_sides_clear_of(points, c, clearance) for c in space.circles], int)
-        around = surroundings(space, clearance, sides)
+        around = surroundings(space, clearance, sides, must_stop)
+        if around is None:
+            return None
         cleared = points if is_clear(around, points) else moved_clear(space, around, points)
         if cleared is not None:
             return around, cleared
@@ -118,12 +129,12 @@ def _sides_clear_of(points: Array, circle: Circle, clearance: float) -> int:
 
 
 def _with_finer_discs(
-    space: FreeSpace, around: Surroundings, band: Band
+    space: FreeSpace, around: Surroundings, band: Band, must_stop: MustStop
 ) -> tuple[Surroundings, Band] | None:
     """Surroundings with four times the sides around the discs that the path bends round.
 
     A coarse corner is replaced by four that lie behind it, and the path is pulled onto them. None
-    where no disc that the path touches can have more sides.
+    where no disc that the path touches can have more sides, or where it must stop.
     """
     band = _pruned(around, band)
     touched = np.unique(around.discs[band.bends])
@@ -133,7 +144,9 @@ def _with_finer_discs(
         return None
     sides = around.sides.copy()
     sides[grown] *= 4
-    finer = surroundings(space, float(around.clearance[0]), sides)
+    finer = surroundings(space, float(around.clearance[0]), sides, must_stop)
+    if finer is None:
+        return None
     plain = int((around.discs[:-1] == NONE).sum())
     old_first = plain + np.concatenate([[0], np.cumsum(around.sides)])
     new_first = plain + np.concatenate([[0], np.cumsum(sides)])
@@ -220,7 +233,7 @@ def _joined(parts: list[Band]) -> Band:
     return Band(*(np.concatenate([getattr(part, name) for part in kept]) for name in names))
 
 
-def _smoothed(surface: Surface, around: Surroundings, band: Band) -> Band:
+def _smoothed(surface: Surface, around: Surroundings, band: Band, must_stop: MustStop) -> Band:
     """The band with each part between contacts moved onto a geodesic.
 
     The error falls with the fourth power of the spacing of points. Where such a part meets another
@@ -228,17 +241,19 @@ def _smoothed(surface: Surface, around: Surroundings, band: Band) -> Band:
     """
     for _ in range(SMOOTHING_ROUNDS):
         parts = [
-            _smoothed_part(surface, around, part) if is_geodesic else part
+            _smoothed_part(surface, around, part, must_stop)
+            if is_geodesic and not must_stop()
+            else part
             for part, is_geodesic in _stretches(surface, around, band)
         ]
         smoothed = _joined(parts)
         if (smoothed.bends != NONE).sum() == (band.bends != NONE).sum():
             return smoothed
-        band = tightened(surface, around, smoothed)
+        band = tightened(surface, around, smoothed, must_stop)
     return band
 
 
-def _smoothed_part(surface: Surface, around: Surroundings, part: Band) -> Band:
+def _smoothed_part(surface: Surface, around: Surroundings, part: Band, must_stop: MustStop) -> Band:
     """A part between contacts, moved onto the geodesic between its ends."""
     pieces = len(part.points) - 1
     if math.isinf(surface.resolution):
@@ -247,16 +262,19 @@ def _smoothed_part(surface: Surface, around: Surroundings, part: Band) -> Band:
     if pieces < FEWEST_PIECES:
         longest = float(np.hypot(*np.diff(part.points, axis=0).T).max())
         part = subdivided(part, longest * pieces / FEWEST_PIECES)
-    settled = settle(surface, part.points)
+    settled = settle(surface, part.points, must_stop)
     corrected = correct(surface, settled)
     return advanced(around, part, settled if corrected is None else corrected)[0]
 
 
-def _placed(surface: Surface, around: Surroundings, band: Band, tolerance: float) -> Array:
+def _placed(
+    surface: Surface, around: Surroundings, band: Band, tolerance: float, must_stop: MustStop
+) -> Array:
     """The final points (m, 2), along the geodesics between contacts."""
     placed = [band.points[:1]]
     for part, is_geodesic in _stretches(surface, around, band):
-        points = _placed_part(surface, around, part, tolerance) if is_geodesic else part.points
+        curved = is_geodesic and not must_stop()
+        points = _placed_part(surface, around, part, tolerance) if curved else part.points
         placed.append(points[1:])
     return np.concatenate(placed)
 

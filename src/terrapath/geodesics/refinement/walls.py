@@ -16,6 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..._kernels.geodesics import contacts as kernels
 from ..._kernels.space import free_space as grids
+from ..._support.watching import MustStop, never
 from ...space.free_space import FreeSpace, Indices, cell_margin, index_grid, listed
 from ...surface import Mask
 from ...surface.bounds import Bounds
@@ -185,10 +186,17 @@ def _bounds(bounds: Bounds, clearance: float) -> Outline:
     return Outline(edges, normals, np.full(4, clearance), empty, empty)
 
 
-def surroundings(space: FreeSpace, clearance: float, sides: Indices) -> Surroundings:
-    """All walls and corners of a free space. sides : (discs,), of the polygon around each disc."""
+def surroundings(
+    space: FreeSpace, clearance: float, sides: Indices, must_stop: MustStop = never
+) -> Surroundings | None:
+    """All walls and corners of a free space. sides : (discs,), of the polygon around each disc.
+
+    None where it must stop.
+    """
     parts = [_bounds(space.bounds, clearance)]
     for geometry in space.geometries:
+        if must_stop():
+            return None
         parts += [_ring(ring, clearance) for ring in _rings(geometry)]
     for mask in space.masks:
         widened = CELL_MARGINS * cell_margin(mask, space.bounds) * max(mask.spacing)
