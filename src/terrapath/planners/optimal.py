@@ -223,15 +223,18 @@ class _Run:
     def try_finer_fields(self) -> None:
         """Fields on ever finer lattices, where a shorter route could lead."""
         lattice = self.fields[0].lattice
-        spacing = lattice.spacing
+        spacing, seconds_per_node = lattice.spacing, 0.0
         while math.isfinite(self.best) and not self.must_stop():
             spacing = Spacing(0.5 * spacing.x, 0.5 * spacing.y)
-            lattice = Lattice.spanning(self.window(), spacing)
-            before = self.best
-            if lattice.nx * lattice.ny > MOST_NODES or not self.try_fields_on(lattice, 1):
+            lattice, before = Lattice.spanning(self.window(), spacing), self.best
+            nodes, left = lattice.nx * lattice.ny, self.stopper.seconds_left
+            is_late = left is not None and nodes * seconds_per_node > left
+            started = self.stopper.seconds
+            if nodes > MOST_NODES or is_late or not self.try_fields_on(lattice, 1):
                 return
             if self.is_sure and self.best >= before * (1.0 - GAIN):
                 return
+            seconds_per_node = (self.stopper.seconds - started) / nodes
 
     def window(self) -> Bounds:
         """The part of the bounds where a route could be shorter than the best, by the fields."""
