@@ -33,6 +33,11 @@ TRIES = 6
 SAME_PLACE = 1e-3
 SAME_LENGTH = 1e-7
 
+# Two values of fields that differ by no more than this share may belong to one route. And this
+# is the most by which a field is taken to be wrong, as a share: on the roughest ground every
+# candidate could be shorter otherwise.
+SAME_VALUE, MOST_DOUBT = 1e-4, 0.01
+
 # Two routes are compared at this many places.
 LOOKS = 65
 
@@ -78,7 +83,7 @@ def routes_of_fields(
     from_goal: DistanceField,
     count: int,
     *,
-    margin: float = math.inf,
+    only_shorter: bool = False,
     failed: Callable[[Exception], object],
     must_stop: MustStop = never,
     is_late: MustStop = never,
@@ -86,16 +91,20 @@ def routes_of_fields(
     """Distinct routes, each as soon as it is refined; the path down the fields comes first.
 
     from_start, from_goal : distance fields on one lattice. count : routes that are asked for; more
-    are tried, because a later one may be shorter. margin : but none that the fields say are longer
-    than the first by more than this share. failed : is called with the error where a
-    route cannot be refined. must_stop : is asked after each candidate whether to end the search.
+    are tried, because a later one may be shorter. only_shorter : then only those that may be
+    shorter than all before, as far as the fields are right about the best. failed : is called with
+    the error where a route cannot be refined. must_stop : is asked after each candidate whether to end the search.
     is_late : is asked many times a second; when it says True, the route in hand is not refined
     any further.
     """
     found: list[Path] = []
+    value = float(from_start.at(problem.goal))
     for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
-        if len(found) >= count and candidate.excess > margin:
-            break
+        if only_shorter and len(found) >= count:
+            best = min(route.length for route in found)
+            doubt = min(abs(best / value - 1.0), MOST_DOUBT) + SAME_VALUE
+            if candidate.value > best * (1.0 + doubt):
+                break
         try:
             route = refine(problem, candidate.path, must_stop=is_late)
         except Exception as error:
@@ -109,31 +118,35 @@ def routes_of_fields(
 
 
 class _Candidate(NamedTuple):
-    """A path down two fields, and how much longer than the first they say it is, as a share."""
+    """A path down two fields, and how long they say it is, map units."""
 
     path: Path
-    excess: float
+    value: float
 
 
 def _candidates(
     problem: Problem, from_start: DistanceField, from_goal: DistanceField
 ) -> Iterator[_Candidate]:
-    """Routes through the nodes of least detour, each away from all routes before it."""
+    """Paths down both fields, then routes through the nodes of least detour, away from others."""
     direct = from_start.path_to(problem.goal)
     if direct is None:
         return
-    yield _Candidate(direct, 0.0)
+    value = float(from_start.at(problem.goal))
+    yield _Candidate(direct, value)
     lattice = from_start.lattice
+    back = from_goal.path_to(problem.start)
+    if back is not None and not _stay_together(direct, back, max(lattice.spacing)):
+        yield _Candidate(problem.path(back.points[::-1].copy()), value)
     radius = NEIGHBOURHOOD * problem.bounds.side
     detours = from_start.values + from_goal.values
     vias = _away_from(direct, _vias(detours, lattice, radius), radius)
     while len(vias):
         path = _lead_through(problem, from_start, from_goal, vias[0, :2])
-        excess = vias[0, 2] / float(detours.min()) - 1.0
+        value = float(vias[0, 2])
         vias = vias[1:]
         if path is not None:
             vias = _away_from(path, vias, radius)
-            yield _Candidate(path, excess)
+            yield _Candidate(path, value)
 
 
 def _away_from(path: Path, vias: Array, radius: float) -> Array:

@@ -36,11 +36,7 @@ from .rrt_star import RRTStar
 
 # A field whose value at the goal is this near to the length of the best route, as a share, shows
 # every route that could be shorter. Elsewhere other searches follow, and finer fields.
-SURE = 1e-3
-
-# Routes that the fields say are longer by more than this share are not refined, once there are
-# as many as were asked for.
-MARGIN = 0.01
+SURE = 1e-4
 
 # A finer field is solved where the best route may be this share longer than what a field says, at
 # least; and while that takes no more nodes than this.
@@ -266,7 +262,7 @@ class _Run:
                 self.problem,
                 *self.fields,
                 count,
-                margin=MARGIN,
+                only_shorter=True,
                 failed=self.failures.append,
                 must_stop=self.must_stop,
                 is_late=self.stopper.is_late,
