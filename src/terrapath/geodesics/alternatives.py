@@ -93,9 +93,9 @@ def routes_of_fields(
     from_start, from_goal : distance fields on one lattice. count : routes that are asked for; more
     are tried, because a later one may be shorter. only_shorter : then only those that may be
     shorter than all before, as far as the fields are right about the best. failed : is called with
-    the error where a route cannot be refined. must_stop : is asked after each candidate whether to end the search.
-    is_late : is asked many times a second; when it says True, the route in hand is not refined
-    any further.
+    the error where a route cannot be refined. must_stop : is asked after each candidate whether to
+    end the search. is_late : is asked many times a second; when it says True, the route in hand is
+    not refined any further.
     """
     found: list[Path] = []
     value = float(from_start.at(problem.goal))
