@@ -7,6 +7,7 @@ from .errors import (
     BlockedError as BlockedError,
     CertificateError as CertificateError,
     FitError as FitError,
+    GroundWarning as GroundWarning,
     InputError as InputError,
     KernelWarning as KernelWarning,
     MapError as MapError,

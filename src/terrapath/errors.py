@@ -69,6 +69,10 @@ class RepairedWarning(VectorWarning):
     """Geometries of a vector file were not valid, and were repaired."""
 
 
+class GroundWarning(TerrapathWarning):
+    """The planner may miss the shortest path on this kind of ground; another one does not."""
+
+
 class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded. It is left out, or returned as it was before."""
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._support.watching import MustStop
-from ..errors import InputError
+from ..errors import GroundWarning, InputError, tell
 from ..geodesics.rays import (
     TOLERANCE,
     Geodesic,
@@ -23,6 +23,7 @@ from ..geodesics.rays import (
     trace_ray,
 )
 from ..problem import Path, Problem, Solution, Status
+from ..surface.metric import is_rough
 from ..validation import Array, as_point, require_count, require_positive
 from .base import Callback, Progress, Stopper, answer_without_search, least_limit
 
@@ -93,7 +94,7 @@ class GeodesicTraversal:
 
     Where two neighbouring rays pass the goal on different sides, the geodesic between them that
     ends at the goal is solved for. Obstacles are not avoided: a geodesic that touches one is
-    left out.
+    left out. Among obstacles and on rough ground a GroundWarning says that routes may be missed.
     Source: paper, section 5; appendix 6.1.
     """
 
@@ -203,6 +204,7 @@ class GeodesicTraversal:
         answer = answer_without_search(problem, self.name)
         if answer is not None:
             return answer
+        _tell_doubts(problem)
         started = time.perf_counter()
         fan = self.fan(problem, callback=callback, time_limit=time_limit)
         paths = tuple(_path(problem, geodesic) for geodesic in fan.geodesics)
@@ -217,6 +219,22 @@ class GeodesicTraversal:
             samples=len(fan.rays),
             stopped_by=_explain(fan),
             alternatives=paths[1:],
+        )
+
+
+def _tell_doubts(problem: Problem) -> None:
+    """Warn where a fan of rays may miss the shortest path."""
+    doubts = []
+    if problem.free_space.has_obstacles:
+        doubts.append("no ray goes round an obstacle")
+    if is_rough(problem.surface, problem.bounds):
+        doubts.append("on rough ground rays miss routes")
+    if doubts:
+        tell(
+            GroundWarning(
+                f"geodesic-traversal may miss the shortest path here, because "
+                f"{' and '.join(doubts)}; optimal does not"
+            )
         )
 
 
