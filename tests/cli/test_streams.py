@@ -71,7 +71,7 @@ def test_unbuffered_output_that_is_lost_is_told_as_well(lost_output, tmp_path):
 
 def test_exit_codes_are_the_same_where_standard_error_is_lost(lost_output, tmp_path):
     assert command("plan", "nowhere", stderr=lost_output).returncode == 2
-    few = ["--samples", "20", "--step", "0.1"]
+    few = ["--samples", "20", "--step", "0.1", "--uniform"]
     assert command("plan", "six-peaks", *few, stderr=lost_output).returncode == 3
     both = command(
         *ROUTE, "--output", tmp_path / "route.csv", stdout=lost_output, stderr=lost_output

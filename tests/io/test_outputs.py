@@ -247,7 +247,7 @@ def test_looking_whether_a_file_can_be_written_leaves_nothing(tmp_path):
 
 
 def test_a_solution_without_a_path_is_not_written(tmp_path):
-    nothing = tp.RRTStar(samples=5, step=0.1).solve(tp.scenes.load("one-peak"))
+    nothing = tp.RRTStar(samples=5, step=0.1, informed=False).solve(tp.scenes.load("one-peak"))
     with pytest.raises(tp.MapError, match="no path"):
         tp.write_route(nothing, tmp_path / "route.csv")
     shutil.rmtree(tmp_path / "none", ignore_errors=True)

@@ -279,7 +279,7 @@ def test_a_true_length_that_a_path_beats_is_no_true_length():
 
 
 def test_a_search_that_fails_is_one_line():
-    trial = PathTrial("one-peak", RRTStar(samples=3, step=0.1))
+    trial = PathTrial("one-peak", RRTStar(samples=3, step=0.1, informed=False))
     with pytest.raises(InputError, match="found no path on one-peak; give it more samples"):
         trial.measure()
 

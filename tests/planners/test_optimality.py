@@ -62,24 +62,35 @@ def test_the_chord_baseline_believes_less_than_the_truth_and_travels_more():
     assert chord.cost < 17.018129404 < riemannian.length < chord.length
 
 
-@pytest.mark.parametrize(
-    ("informed", "steepest", "flattest"), [(False, -1.5, -0.4), (True, -2.2, -0.8)]
-)
-def test_the_excess_length_falls_with_the_number_of_samples(informed, steepest, flattest):
+TRUTH = 17.018129404  # six-peaks
+
+
+def mean_excess(samples, seeds, **options):
     problem = scenes.load("six-peaks")
-    counts = np.array([1250, 5000, 20_000])
-    excess = [
-        np.mean(
-            [
-                tp.RRTStar(samples=n, seed=s, informed=informed).solve(problem).length
-                for s in range(5)
-            ]
-        )
-        - 17.018129404
-        for n in counts.tolist()
-    ]
-    slope = np.polyfit(np.log(counts), np.log(excess), 1)[0]
-    assert steepest < slope < flattest
+    planners = [tp.RRTStar(samples=samples, seed=seed, **options) for seed in range(seeds)]
+    return np.mean([planner.solve(problem).length for planner in planners]) / TRUTH - 1.0
+
+
+# Measured: -1.05 and -0.63. An informed tree starts near the optimum, with a path over a lattice,
+# so its line is flatter; in return its excess is far less at every count, and that is held as well
+# (1.6e-3, 5.7e-4 and 2.7e-4, where uniform samples leave 4.1e-2, 5.2e-3 and 2.3e-3).
+@pytest.mark.parametrize(
+    ("informed", "steepest", "flattest", "most"),
+    [(False, -1.5, -0.4, [6e-2, 1e-2, 4e-3]), (True, -1.2, -0.4, [2.5e-3, 9e-4, 4e-4])],
+)
+def test_the_excess_length_falls_with_the_number_of_samples(informed, steepest, flattest, most):
+    counts = [1250, 5000, 20_000]
+    excess = [mean_excess(n, 5, informed=informed) for n in counts]
+    assert steepest < np.polyfit(np.log(counts), np.log(excess), 1)[0] < flattest
+    assert (np.array(excess) < most).all()
+
+
+@pytest.mark.slow
+def test_an_informed_tree_does_not_stall_where_the_path_is_crowded():
+    # Measured 2.7e-4 and 1.35e-4, a slope of -0.25; uniform samples leave 3.9e-4.
+    few, many = (mean_excess(n, 3) for n in (20_000, 320_000))
+    assert many < 0.7 * few
+    assert many < 2e-4
 
 
 @pytest.mark.parametrize("name", ["one-peak", "six-peaks", "repeat-4d"])

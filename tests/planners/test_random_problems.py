@@ -215,6 +215,21 @@ def check_separated(case):
     assert of_start[0] != of_goal[0]
 
 
+def check_no_worse(case, short, long, believed):
+    """More samples never make what is returned worse.
+
+    Both informed trees of RRT*-R begin with the same path, which is returned where it is truly
+    shorter than the tree's; its cost is then its true length. So it bounds the other's length.
+    """
+    if case.planner != "rrt-star-r":
+        assert (long.cost, short.cost) == (believed[1], believed[0])
+        return
+    for k, (one, other) in enumerate([(short, long), (long, short)]):
+        if one.cost != believed[k]:
+            assert one.cost == one.length
+            assert other.length <= one.length
+
+
 def options_of(case):
     """Algorithm 1 to the letter where a planner has the choice, so that edges can be checked."""
     options = dict(case.options)
@@ -244,9 +259,11 @@ def check(case):
         else:
             assert solution.status is tp.Status.SOLVED
             check_path(case, problem, solution)
+    believed = [solution.history.best_cost[-1] for solution in (short, long)]
+    assert believed[1] <= believed[0]
     if short.path is not None:
         assert long.path is not None
-        assert long.cost <= short.cost
+        check_no_worse(case, short, long, believed)
     return long.path is not None
 
 

@@ -146,7 +146,7 @@ def test_the_field_of_flat_ground_without_obstacles_is_drawn():
 
 
 def test_a_search_without_a_path_is_drawn_too(problem, tmp_path):
-    nothing = tp.RRTStar(samples=5, step=0.1).solve(problem)
+    nothing = tp.RRTStar(samples=5, step=0.1, informed=False).solve(problem)
     plot_route(nothing, tmp_path / "nothing.svg")
     assert "no path" in draw_route(nothing).get_suptitle()
     assert (tmp_path / "nothing.svg").stat().st_size > 10_000
@@ -262,7 +262,7 @@ def test_long_profiles_in_metres_are_labelled_in_kilometres():
 
 
 def test_there_is_no_profile_without_a_path(problem, tmp_path):
-    nothing = tp.RRTStar(samples=5, step=0.1).solve(problem)
+    nothing = tp.RRTStar(samples=5, step=0.1, informed=False).solve(problem)
     with pytest.raises(tp.MapError, match="no path"):
         plot_profile(nothing, tmp_path / "profile.png")
     assert list(tmp_path.iterdir()) == []
@@ -362,7 +362,7 @@ def test_next_best_routes_and_a_search_without_a_path_have_their_pages(solution,
     plot_page(replace(solution, alternatives=(bow,)), tmp_path / "page.html")
     drawn = traces_of(tmp_path / "page.html")[f"next best, {bow.length:.4f}"]
     assert decoded(drawn["x"]).tolist() == bow.profile.points[:, 0].tolist()
-    nothing = tp.RRTStar(samples=5, step=0.1).solve(solution.problem)
+    nothing = tp.RRTStar(samples=5, step=0.1, informed=False).solve(solution.problem)
     assert "found no path" in draw_page(nothing).layout.title.text
     with pytest.raises(tp.MapError, match=r"page\.png.*\.html"):
         plot_page(solution, tmp_path / "page.png")

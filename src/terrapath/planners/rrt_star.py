@@ -322,9 +322,9 @@ class RRTStar:
     informed : begin with the straight line to the goal, or where that is blocked or dear with a
         path over a coarse lattice. Then leave out samples that cannot improve the best path, by
         their chords (Gammell et al. 2014), and draw 0.3 of them near it (Akgun and Stilman 2011);
-        where the tree is crowded these are left out. Hang vertices below their parents' parents
-        where that is shorter (Jeong et al. 2019). With ``False`` all of the region is sampled, as
-        in the paper.
+        where the tree is crowded, of these only the ones that shorten it are kept. Hang vertices
+        below their parents' parents where that is shorter (Jeong et al. 2019). With ``False`` all
+        of the region is sampled, as in the paper.
     prune : do not measure edges whose chord is already too long; the tree stays the same.
     panel : longest piece of an edge that one application of Line-R measures, map units; by
         default as long as the surface's features allow, and on rough ground edges of informed

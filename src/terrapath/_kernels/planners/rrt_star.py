@@ -280,6 +280,36 @@ def refresh_buckets(tree, options, radius):
 # radius. So what a sample costs stays O(log n), and no uniform sample is ever left out.
 CROWD = 30.0
 
+# In a crowd a sample is still kept where it shortens the best path by this share. That can happen
+# only so often, however large the tree: all of these gains together are no more than the path.
+GAIN = 1e-7
+
+
+@kernel
+def shortens_path(surface, space, tree, options, new, radius, spare):
+    """Is the best path shorter by GAIN through the new point, between two vertices near it?
+
+    spare : the index of an unused candidate, for workspace.
+    """
+    vertex, p, candidate = tree.counters[GOAL], tree.places[new], tree.near[spare]
+    gain = GAIN * tree.places[vertex, COST]
+    most = -math.inf  # what the path to the new point must cost less than
+    while vertex >= 0:
+        squared = squared_distance(tree.places, vertex, p[X], p[Y])
+        candidate.vertex, candidate.squared = vertex, squared
+        vertex = tree.links[vertex].parent
+        if squared > radius * radius:
+            continue
+        at_least = measure_chord(tree, new, spare)
+        if at_least >= most - gain and candidate.cost - candidate.chord <= most:
+            continue
+        length = candidate_length(surface, tree, options, new, spare)
+        if candidate_is_free(space, tree, new, spare):
+            if candidate.cost + length < most - gain:
+                return True
+            most = max(most, candidate.cost - length)
+    return False
+
 
 @kernel
 def extend(surface, space, tree, options, x, y, is_beside):
@@ -291,9 +321,12 @@ def extend(surface, space, tree, options, x, y, is_beside):
     radius = near_radius(tree, options)
     refresh_buckets(tree, options, radius)
     x, y, count, closest = find_near(tree, options, radius, x, y)
-    if tree.near[closest].squared == 0.0 or (is_beside and count > CROWD * math.log(new)):
+    if tree.near[closest].squared == 0.0:
         return False
     place(surface, tree, new, x, y)
+    is_crowded = is_beside and count > CROWD * math.log(new)
+    if is_crowded and not shortens_path(surface, space, tree, options, new, radius, count):
+        return False
     promising = measure_chords(tree, new, count)
     if promising < 0 or not candidate_is_free(space, tree, new, closest):
         return False
