@@ -20,13 +20,17 @@ from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, Point, PointLike, as_point, as_points
-from .medium import Medium, Watch, lift_of
+from .medium import EdgeTree, Medium, Watch, lift_of
 
 if TYPE_CHECKING:
     from ..space.constraints import Area
 
 # The length of a step on a path back to the source, in nodes.
 STEP = 0.5
+
+# A path down the field that is this many times as long as the field says has lost its way, on very
+# rough ground.
+ASTRAY = 1.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,29 +104,43 @@ class DistanceField:
         """The path from the source to a goal (x1, x2), map units; None where there is none.
 
         It follows steepest descent where the field is smooth and the ground is free. Elsewhere it
-        goes to the best node nearby that a free segment leads to; and where that leads nowhere, it
-        follows the edges of the lattice. So there is a path where the field is finite.
+        goes to the best node nearby that a free segment leads to. Where that leads nowhere or
+        astray, it follows the edges of the lattice. So there is a path where the field is finite.
         Raises OutsideSurfaceError where the goal is outside the bounds.
         """
         end = np.array([as_point(goal, "goal")])
         distance = float(self.at(end)[0])
         if not math.isfinite(distance):
             return None
+        path = self._downhill(end[0], distance)
+        if path is not None and path.length <= ASTRAY * distance:
+            return path
+        other = self._along_edges(end[0])
+        paths = [found for found in (path, other) if found is not None]
+        return min(paths, key=lambda found: found.length, default=None)
+
+    def _downhill(self, goal: Array, distance: float) -> Path | None:
+        """The path down the field; None where it leads nowhere."""
         # On the plane, no shortest path is longer than its length over the least cost; and it
         # visits each node only a few times.
-        farthest = distance / self.surface.least_cost / min(self.lattice.dx, self.lattice.dy)
+        farthest = distance / self.surface.least_cost / min(self.lattice.spacing)
         most = min(1.2 * farthest / STEP, 4.0 * self.values.size / STEP)
         points = np.empty((int(most) + 16, 2))
-        points[0] = end[0]
+        points[0] = goal
         count = descent.trace(self.surface.data, self.free_space.data, self._field, STEP, points)
-        found = points[:count] if count else self._along_edges(end[0])
-        return Path(self.surface, found[::-1].copy())
+        return Path(self.surface, points[:count][::-1].copy()) if count else None
 
-    def _along_edges(self, goal: Array) -> Array:
-        """The shortest path (m, 2) along the edges of the lattice, from the goal to the source."""
-        nodes = self.medium.edges_to(self.source, goal)
+    def _along_edges(self, goal: Array) -> Path | None:
+        """The shortest path along the edges of the lattice."""
+        nodes = self.medium.along_edges(self._edge_tree, goal)
+        if nodes is None:
+            return None
         places = self.lattice.points.reshape(-1, 2)[nodes]
-        return np.vstack([goal, places, self.source])
+        return Path(self.surface, np.vstack([goal, places, self.source])[::-1].copy())
+
+    @cached_property
+    def _edge_tree(self) -> EdgeTree:
+        return self.medium.edge_tree(self.source)
 
     @cached_property
     def reached(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,6 @@ from ..space.lattice import Lattice
 from ..surface import Surface
 from ..surface.metric import feature_size
 from ..validation import Array, PointLike
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 # The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
 BUCKET_SHARE = 4.0
@@ -45,6 +42,13 @@ PIECES_PER_FEATURE = 0.5
 
 # Is called with the number of nodes settled so far; returning True stops the march.
 Watch = Callable[[int], bool | None]
+
+
+class EdgeTree(NamedTuple):
+    """Shortest paths along edges; the last node is the source."""
+
+    values: Array  # (n + 1,), map units
+    before: npt.NDArray[np.int32]  # (n + 1,): the node before each on its path
 
 
 class Medium:
@@ -123,36 +127,35 @@ class Medium:
         )
         return seeds, costs
 
-    def edges_to(self, source: tuple[float, float], goal: Array) -> npt.NDArray[np.int64]:
-        """The nodes (k,) of the shortest path along edges from a goal (2,) to a source.
-
-        Raises LookupError where no edges lead from one to the other.
-        """
+    def edge_tree(self, source: tuple[float, float]) -> EdgeTree:
+        """The shortest paths along edges from a source to all nodes."""
+        from scipy.sparse import csr_array
         from scipy.sparse.csgraph import dijkstra
 
         count = self.lattice.nx * self.lattice.ny
-        before = dijkstra(self._graph(source, goal), indices=count, return_predecessors=True)[1]
-        path = [before[count + 1]]
-        while path[-1] != count:
-            if path[-1] < 0:
-                raise LookupError("no edges lead from the goal to the source")
-            path.append(before[path[-1]])
-        return np.asarray(path[-2::-1], np.int64)
-
-    def _graph(self, source: tuple[float, float], goal: Array) -> csr_array:
-        """The costs of all edges; the last two nodes are the goal and the source."""
-        from scipy.sparse import csr_array
-
-        count = self.lattice.nx * self.lattice.ny
-        beside_goal, from_goal = self._seeds(goal, REACH)
-        beside_source, to_source = self._seeds(source, SEED_RADIUS)
+        beside, values = self._seeds(source, SEED_RADIUS)
         tails = np.repeat(np.arange(count), np.diff(self.stars.first))
         heads = tails + self.steps[self.stars.directions]
-        begins = [tails, np.full(len(beside_goal), count), beside_source]
-        ends = [heads, beside_goal, np.full(len(beside_source), count + 1)]
-        costs = np.concatenate([self.stars.costs, from_goal, to_source])
-        pairs = (np.concatenate(begins), np.concatenate(ends))
-        return csr_array((costs, pairs), shape=(count + 2, count + 2))
+        # The source is one more node.
+        pairs = (np.append(tails, np.full(len(beside), count)), np.append(heads, beside))
+        costs = np.append(self.stars.costs, values)
+        graph = csr_array((costs, pairs), shape=(count + 1, count + 1))
+        values, before = dijkstra(graph, indices=count, return_predecessors=True)
+        return EdgeTree(values, before)
+
+    def along_edges(self, tree: EdgeTree, goal: Array) -> npt.NDArray[np.int64] | None:
+        """The nodes (k,) of the shortest path along edges from a goal (2,) to a tree's source.
+
+        None where no edges lead there.
+        """
+        beside, values = self._seeds(goal, REACH)
+        values = values + tree.values[beside]
+        if not np.isfinite(values).any():
+            return None
+        nodes = [int(beside[np.argmin(values)])]
+        while (before := int(tree.before[nodes[-1]])) < len(tree.before) - 1:
+            nodes.append(before)
+        return np.array(nodes)
 
     def _front(self, values: Array) -> calendar_queue.Front:
         lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
