@@ -377,7 +377,10 @@ def test_a_plan_on_a_cache_that_is_all_damaged(tmp_path):
     code, path, told = plan(tmp_path)
     assert (code, told) == (0, [])
     files = sorted(tmp_path.rglob("*.nbc"))
-    damages = [damage for name, damage in REPAIRED.items() if "cache" not in name]
+    # Another kernel's file is made in a folder of its own; here there are many. It is tested alone.
+    left_out = ("no cache at all", "of another kernel")
+    assert REPAIRED.keys() >= set(left_out)
+    damages = [damage for name, damage in REPAIRED.items() if name not in left_out]
     for file, damage in zip(files, damages[:: len(damages) // len(files)], strict=False):
         damage(file)
     assert plan(tmp_path) == (0, path, [])
