@@ -201,9 +201,9 @@ def test_where_the_nodes_show_no_way_finer_ones_are_tried(name, enclosed, monkey
     module = importlib.import_module(f"terrapath.planners.{name.replace('-', '_')}")
     prepare, nodes = module.Medium, []
 
-    def prepare_and_note(surface, lattice, free_space):
+    def prepare_and_note(surface, lattice, *more):
         nodes.append(lattice.nx)
-        return prepare(surface, lattice, free_space)
+        return prepare(surface, lattice, *more)
 
     monkeypatch.setattr(module, "Medium", prepare_and_note)
     solution = tp.plan(enclosed, name, spacing=0.4)

@@ -172,13 +172,13 @@ def march_both(
         other = beside.submit(march_from, medium, goal, watch=lambda settled: stop.is_set())
         try:
             field = march_from(medium, start, watch=watch)
-            while watch is not None and not wait([other], timeout=0.1).done:
-                if watch(field.values.size):
+            while not wait([other], timeout=0.1).done:
+                if watch is not None and watch(field.values.size):
                     stop.set()
+            return field, other.result()
         except BaseException:
             stop.set()
             raise
-        return field, other.result()
 
 
 def distance_field(

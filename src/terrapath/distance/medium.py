@@ -11,11 +11,12 @@ import numpy.typing as npt
 
 from .._kernels.distance import calendar_queue, ground, hopf_lax, star
 from .._kernels.surface.metric_rows import columns_of, fill_samples
+from .._support.watching import MustStop, never
 from ..errors import InputError
 from ..space.free_space import FreeSpace
 from ..space.lattice import Lattice
 from ..surface import Surface
-from ..surface.metric import feature_size
+from ..surface.metric import chord, feature_size
 from ..validation import Array, PointLike
 
 # The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
@@ -28,8 +29,9 @@ CHUNK = 20_000
 # The edges of all nodes are numbered in 31 bits; on the steepest ground a node has 64.
 MOST_NODES = (2**31 - 1) // (2 * star.HALF)
 
-# Nodes within this distance of the source, in nodes, are seeds: a straight way leads there.
-SEED_RADIUS = 1.5
+# Nodes within this distance of the source, in nodes, are seeds: a straight way leads there. It is
+# the length of the longest edge, so that no segment of a star lies beyond the source.
+SEED_RADIUS = 5.9
 
 # A path along edges begins at a node within this distance of the goal, in nodes.
 REACH = 3.0
@@ -37,8 +39,8 @@ REACH = 3.0
 # An edge between neighbouring nodes has at least three samples, and two for each feature of the
 # surface; but no more pieces than this.
 MOST_PIECES = 4
-# On smooth ground a piece may be longer than an edge: a feature of the surface has so many.
-PIECES_PER_FEATURE = 0.5
+# On smooth ground a piece may be longer than an edge: it is this share of a feature.
+FEATURES_PER_PIECE = 0.5
 
 # Is called with the number of nodes settled so far; returning True stops the march.
 Watch = Callable[[int], bool | None]
@@ -52,12 +54,22 @@ class EdgeTree(NamedTuple):
 
 
 class Medium:
-    """A surface and its free space on a lattice, prepared for marching from any source."""
+    """A surface and its free space on a lattice, prepared for marching from any source.
 
-    def __init__(self, surface: Surface, lattice: Lattice, free_space: FreeSpace) -> None:
+    must_stop : is asked many times a second. Where it says True, there are no edges, and a march
+    reaches nothing but the source's surroundings.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        lattice: Lattice,
+        free_space: FreeSpace,
+        must_stop: MustStop = never,
+    ) -> None:
         self.surface, self.lattice, self.free_space = surface, lattice, free_space
         self.ground = _sample(surface, lattice)
-        self.stars = _lay_stars(self.ground, lattice, free_space)
+        self.stars = _lay_stars(self.ground, lattice, free_space, must_stop)
         self.steps = star.NORTH * lattice.nx + star.EAST
         per = 2 * self.ground.pieces
         self.data = hopf_lax.Medium(
@@ -120,12 +132,11 @@ class Medium:
         starts = np.broadcast_to(np.asarray(source), points.shape)
         near &= self.free_space.segments_are_free(starts, points)
         seeds = (rows * lattice.nx + columns)[near].astype(np.int64)
-        costs = np.empty(len(seeds))
-        pieces = 2 * self.ground.pieces
-        ground.fill_rays(
-            self.surface.data, np.asarray(source), np.ascontiguousarray(points[near]), pieces, costs
-        )
-        return seeds, costs
+        costs, per = np.empty(len(seeds)), 2 * self.ground.pieces
+        nodes = np.column_stack([columns[near], rows[near]]).astype(np.float64)
+        ground.fill_rays(self.ground, *(per * place).tolist(), per * nodes, costs)
+        least = chord(self.surface, np.broadcast_to(source, points[near].shape), points[near])
+        return seeds, np.maximum(costs, least)
 
     def edge_tree(self, source: tuple[float, float]) -> EdgeTree:
         """The shortest paths along edges from a source to all nodes."""
@@ -188,12 +199,14 @@ def _sample(surface: Surface, lattice: Lattice) -> ground.Ground:
     heights = np.empty((len(surface.data.weights), grid.ny, grid.nx))
     costs = np.empty((1 if surface.costs else 0, grid.ny, grid.nx))
     fill_samples(surface.data, grid, columns_of(surface.data, grid), heights, costs)
-    reach = 2.0 * max(1.0, PIECES_PER_FEATURE / features) if features > 0.0 else math.inf
+    reach = 2.0 * max(1.0, FEATURES_PER_PIECE / features) if features > 0.0 else math.inf
     return ground.Ground(heights, costs, grid.dx, grid.dy, pieces, reach, surface.least_cost)
 
 
-def _lay_stars(samples: ground.Ground, lattice: Lattice, free_space: FreeSpace) -> star.Stars:
-    """The edges that a march needs, without those that touch an obstacle."""
+def _lay_stars(
+    samples: ground.Ground, lattice: Lattice, free_space: FreeSpace, must_stop: MustStop
+) -> star.Stars:
+    """The edges that a march needs, without those that touch an obstacle; none where it stops."""
     count = lattice.nx * lattice.ny
     if count > MOST_NODES:
         raise InputError(
@@ -201,15 +214,34 @@ def _lay_stars(samples: ground.Ground, lattice: Lattice, free_space: FreeSpace) 
             "all; give a wider spacing"
         )
     ahead, back = np.zeros(count, np.uint32), np.zeros(count, np.uint32)
+    parts = _parts(lattice)
+    for rows in parts:
+        star.choose_edges(samples, lattice.nx, lattice.ny, rows, ahead, back)
+        if must_stop():
+            return _no_stars(count)
+    for rows in parts if free_space.has_obstacles else ():
+        star.cut_edges(free_space.data, lattice.data, rows, ahead, back)
+        if must_stop():
+            return _no_stars(count)
     first = np.zeros(count + 1, np.int32)
-    star.choose_edges(samples, lattice.nx, lattice.ny, ahead, back)
-    if free_space.has_obstacles:
-        star.cut_edges(free_space.data, lattice.data, ahead, back)
     star.count_edges(ahead, back, first)
     edges = int(first[-1])
     stars = star.Stars(first, np.empty(edges, np.uint8), np.empty(edges, np.float32))
-    star.lay_edges(samples, lattice.nx, ahead, back, stars)
+    for rows in parts:
+        star.lay_edges(samples, lattice.nx, rows, ahead, back, stars)
+        if must_stop():
+            return _no_stars(count)
     return stars
+
+
+def _parts(lattice: Lattice) -> list[tuple[int, int]]:
+    """The rows of a lattice in parts of about CHUNK nodes, each as its first row and its end."""
+    step = max(CHUNK // lattice.nx, 1)
+    return [(row, min(row + step, lattice.ny)) for row in range(0, lattice.ny, step)]
+
+
+def _no_stars(count: int) -> star.Stars:
+    return star.Stars(np.zeros(count + 1, np.int32), np.empty(0, np.uint8), np.empty(0, np.float32))
 
 
 def lift_of(surface: Surface, point: PointLike) -> Array:

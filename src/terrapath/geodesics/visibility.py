@@ -111,7 +111,7 @@ def _spline_is_flat(data: Spline, bounds: Bounds) -> bool:
 
 
 def shortest_taut_path(problem: Problem, *, watch: Watch | None = None) -> Taut:
-    """The shortest path of a problem on flat ground, to 1e-9 relative.
+    """The shortest path of a problem on flat ground, to 1e-7 relative.
 
     Discs are replaced by polygons around them: the path is longer by less than 3e-7, relative,
     where there are up to 16 discs, and by less than 1e-3 where there are more than 1,000.

@@ -90,7 +90,8 @@ class _Run:
         """The distance field, solved as far as the time limit allows."""
         problem = self.problem
         self.total = lattice.nx * lattice.ny
-        medium = Medium(problem.surface, lattice, problem.free_space)
+        is_late = self.stopper.is_late
+        medium = Medium(problem.surface, lattice, problem.free_space, is_late)
         return march_from(medium, problem.start, watch=self.must_stop)
 
     def must_stop(self, settled: int) -> bool:

@@ -233,7 +233,7 @@ def _tell_doubts(problem: Problem) -> None:
         tell(
             GroundWarning(
                 f"geodesic-traversal may miss the shortest path here, because "
-                f"{' and '.join(doubts)}; optimal does not"
+                f"{' and '.join(doubts)}; optimal looks farther"
             )
         )
 

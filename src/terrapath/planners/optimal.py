@@ -34,8 +34,8 @@ from .finished import with_bound
 from .grid_search import AStar
 from .rrt_star import RRTStar
 
-# A field whose value at the goal is this near to the length of the best route, as a share, shows
-# every route that could be shorter. Elsewhere other searches follow, and finer fields.
+# A field whose value at the goal is this near to the length of the best route, as a share, is taken
+# to show every route that could be shorter. Elsewhere other searches follow, and finer fields.
 SURE = 1e-4
 
 # A finer field is solved where the best route may be this share longer than what a field says, at
@@ -61,8 +61,8 @@ class Optimal:
     Candidates are the straight line, on flat ground the shortest path round the corners of
     obstacles, and the routes of the distance fields from both ends. Where the fields leave a
     doubt, on rough ground and among obstacles, fields on ever finer lattices follow, A* with 32, 16
-    and 8 neighbours, and a tree. All are refined. The route from a start to a goal is the same as
-    back.
+    and 8 neighbours, and a tree. All but the straight line are refined. The route from a start to a
+    goal is the same as back.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
     field; it is also the path returned where the run ends before a route was refined.
@@ -189,7 +189,8 @@ class _Run:
         """The routes of the distance fields on a lattice; False where they show none."""
         problem = self.problem
         self.total = self.samples + 2 * lattice.nx * lattice.ny
-        medium = Medium(problem.surface, lattice, problem.free_space)
+        is_late = self.stopper.is_late
+        medium = Medium(problem.surface, lattice, problem.free_space, is_late)
         self.fields = march_both(medium, problem.start, problem.goal, watch=self.must_stop)
         self.samples += sum(round(f.reached * f.values.size) for f in self.fields)
         if self.stopper.stopped_by and not math.isfinite(self.distance):
@@ -211,8 +212,15 @@ class _Run:
         return float(self.fields[0].at(self.problem.goal))
 
     def try_planner(self, planner: AStar | RRTStar) -> None:
-        solution = planner.solve(self.problem, time_limit=self.stopper.seconds_left)
+        solution = planner.solve(
+            self.problem,
+            callback=lambda progress: self.must_stop(progress.samples),
+            time_limit=self.stopper.seconds_left,
+        )
         self.samples += solution.samples
+        if solution.status is Status.INTERRUPTED:
+            self.keep_as_it_is(solution.path)
+            raise KeyboardInterrupt
         if solution.path is not None:
             self.refine(solution.path)
 
@@ -271,6 +279,10 @@ class _Run:
         except Exception as error:
             self.failures.append(error)
 
+    def keep_as_it_is(self, path: Path | None) -> None:
+        if path is not None and path.length < self.best:
+            self.direct = path
+
     def keep(self, route: Path) -> None:
         """Keep a route unless it is one of those that are known."""
         for k, other in enumerate(self.found):
@@ -285,7 +297,7 @@ class _Run:
     def tell_failures(self) -> None:
         if self.failures:
             some = "not every route could be refined"
-            none = "no route could be refined; the path is fast marching's"
+            none = "no route could be refined; the path is a planner's own"
             tell_unfinished(some if self.found else none, self.failures[0])
 
     def directed(self, path: Path) -> Path:

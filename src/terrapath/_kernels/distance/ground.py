@@ -252,14 +252,25 @@ def piece(ground, x0, y0, x2, y2):
     return costed(ground, lift, length, costs)
 
 
+@inner_kernel
+def inside(ground, x, y):
+    """A place, moved onto the samples."""
+    return (
+        min(max(x, 0.0), ground.heights.shape[2] - 1.0),
+        min(max(y, 0.0), ground.heights.shape[1] - 1.0),
+    )
+
+
 @kernel
 def gain_by_bending(ground, x0, y0, x2, y2):
     """What a path between two places saves, beside its halves, by bending as a whole."""
     dx, dy = x2 - x0, y2 - y0
     x1, y1 = 0.5 * (x0 + x2), 0.5 * (y0 + y2)
-    wx, wy = -ACROSS * dy, ACROSS * dx
+    lx, ly = inside(ground, x1 + ACROSS * dy, y1 - ACROSS * dx)
+    rx, ry = inside(ground, x1 - ACROSS * dy, y1 + ACROSS * dx)
     p0, p1, p2 = place_at(ground, x0, y0), place_at(ground, x1, y1), place_at(ground, x2, y2)
-    left, right = place_at(ground, x1 - wx, y1 - wy), place_at(ground, x1 + wx, y1 + wy)
+    left, right = place_at(ground, lx, ly), place_at(ground, rx, ry)
+    wx, wy = 0.5 * (rx - lx), 0.5 * (ry - ly)
     lift = flat(dx * ground.dx, dy * ground.dy, wx * ground.dx, wy * ground.dy)
     for layer in range(ground.heights.shape[0]):
         z = ground.heights
@@ -290,6 +301,14 @@ def ray(ground, x, y, dx, dy):
             a, b = k / count, (k + 1) / count
             cost -= gain_by_bending(ground, x + a * dx, y + a * dy, x + b * dx, y + b * dy)
     return cost
+
+
+@kernel
+def fill_rays(ground, x, y, places, costs):
+    """The cost of the nearly straight way from (x, y) to each of the places (m, 2), in samples."""
+    for m in range(places.shape[0]):
+        dx, dy = places[m, 0] - x, places[m, 1] - y
+        costs[m] = ray(ground, x, y, dx, dy) if dx != 0.0 or dy != 0.0 else 0.0
 
 
 # Pieces of the surface itself
@@ -329,11 +348,3 @@ def surface_ray(surface, ax, ay, bx, by, count):
         x, y = ax + k * vx, ay + k * vy
         cost += surface_piece(surface, x, y, x + vx, y + vy)
     return cost
-
-
-@kernel
-def fill_rays(surface, source, points, count, costs):
-    """The cost of the straight way from a source (2,) to each of the points (m, 2)."""
-    for m in range(points.shape[0]):
-        x, y = points[m, 0], points[m, 1]
-        costs[m] = surface_ray(surface, source[0], source[1], x, y, count)

@@ -20,7 +20,7 @@ from ..space.free_space import segment_is_free
 from .calendar_queue import QUEUED, dequeue, enqueue, least
 from .ground import Costs, bent, costed, flat, place_at, plus_rise, ray, read
 from .segments import LEAST_T, NOWHERE, Place, Segment, place_of_least, value_on
-from .star import EAST, HALF, NORTH, beside, direction_between, entry_of
+from .star import EAST, FARTHEST, HALF, NORTH, NUMBERS, beside, direction_between, entry_of
 
 
 class Source(NamedTuple):
@@ -145,13 +145,29 @@ def is_close(medium, node, di, dj):
 
 
 @inner_kernel
+def is_joined(medium, a, n):
+    """Does an edge lead from node a to node n?"""
+    nx = medium.grid.nx
+    i, j = n % nx - a % nx, n // nx - a // nx
+    if max(abs(i), abs(j)) > FARTHEST:
+        return False
+    direction = NUMBERS[j + FARTHEST, i + FARTHEST]
+    return direction >= 0 and entry_of(medium.stars, a, direction) >= 0
+
+
+@inner_kernel
 def bend_beyond(medium, front, state, node, a, b, di, dj):
-    """The second difference of tau at a; (di, dj) leads beyond it from b. NaN where unknown."""
+    """The second difference of tau at a, with b and the node (di, dj) away; NaN where unknown.
+
+    That node lies beyond a, as seen from b.
+    """
     grid = medium.grid
     if not (0 <= node.i + di < grid.nx and 0 <= node.j + dj < grid.ny):
         return math.nan
     n = node.n + dj * grid.nx + di
     if front.u[n] == math.inf or is_close(medium, node, di, dj):
+        return math.nan
+    if medium.has_obstacles and not is_joined(medium, a, n):
         return math.nan
     return state.tau[n] - 2.0 * state.tau[a] + state.tau[b]
 

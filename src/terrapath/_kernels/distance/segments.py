@@ -38,9 +38,6 @@ def value_on(g, t, ca, cb, ta, tb):
     return c * near + tau * far
 
 
-# Where the value rises along a segment at this rate at its beginning, its least is there.
-UPHILL = 0.35
-
 # The least is at the beginning where t is no more than this.
 LEAST_T = 1e-6
 
@@ -67,13 +64,17 @@ def improved(g, t, ca, cb, ta, tb):
 @inner_kernel
 def place_of_least(g, ca, cb, ta, tb, ua, ub):
     """The t of the place on a segment that offers least; 0 where that is its beginning."""
-    near, c = math.sqrt(g.aa), 0.5 * (ca + cb)
+    near, far, c = math.sqrt(g.aa), math.sqrt(g.ss), 0.5 * (ca + cb)
     rise = ub - ua + (cb - ca) * near
-    if rise + c * g.ae / near > UPHILL * c * math.sqrt(g.ee):
-        return 0.0
+    # By how much the value rises from the beginning on; at the source there is no such slope.
+    if far > 0.0:
+        start = ta * g.se / far + (tb - ta) * far + (cb - ca) * near + ca * g.ae / near
+        if start >= 0.0:
+            return 0.0
     room = c * c * g.ee - rise * rise
     t = 0.5
     if room > 0.0:
         across = max(g.aa - g.ae * g.ae / g.ee, 0.0)
         t = -g.ae / g.ee - rise * math.sqrt(across / (g.ee * room))
-    return improved(g, min(max(t, 0.0), 1.0), ca, cb, ta, tb)
+    t = improved(g, min(max(t, 0.0), 1.0), ca, cb, ta, tb)
+    return improved(g, t, ca, cb, ta, tb)

@@ -133,9 +133,12 @@ def is_inside(i, j, nx, ny):
 
 
 @kernel
-def choose_edges(ground, nx, ny, ahead, back):
-    """Choose the edges: bit k of ahead[n] leads from n along direction k, of back[n] against it."""
-    for j in range(ny):
+def choose_edges(ground, nx, ny, rows, ahead, back):
+    """Choose the edges: bit k of ahead[n] leads from n along direction k, of back[n] against it.
+
+    rows : the first, and the one after the last, of those whose stars are looked at.
+    """
+    for j in range(rows[0], rows[1]):
         for i in range(nx):
             n, bits = j * nx + i, needed(metric_of_node(ground, i, j))
             for k in range(0, HALF, EIGHTH if bits == BASE else 1):
@@ -151,9 +154,9 @@ def choose_edges(ground, nx, ny, ahead, back):
 
 
 @kernel
-def cut_edges(space, grid, ahead, back):
-    """Remove the edges that touch an obstacle."""
-    for n in range(ahead.shape[0]):
+def cut_edges(space, grid, rows, ahead, back):
+    """Remove the edges from some rows that touch an obstacle."""
+    for n in range(rows[0] * grid.nx, rows[1] * grid.nx):
         x, y = grid.x0 + n % grid.nx * grid.dx, grid.y0 + n // grid.nx * grid.dy
         for k in range(HALF):
             if not ahead[n] >> k & 1:
@@ -201,9 +204,9 @@ def edge_cost(ground, i, j, k):
 
 
 @kernel
-def lay_edges(ground, nx, ahead, back, stars):
-    """Write all edges with their costs."""
-    for n in range(ahead.shape[0]):
+def lay_edges(ground, nx, rows, ahead, back, stars):
+    """Write the edges from some rows, with their costs."""
+    for n in range(rows[0] * nx, rows[1] * nx):
         bits, place = np.int64(ahead[n]), np.int64(stars.first[n])
         for k in range(0, HALF, EIGHTH if bits & ~BASE == 0 else 1):
             if not bits >> k & 1:

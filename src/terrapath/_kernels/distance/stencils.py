@@ -14,7 +14,6 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
-from ..space.free_space import segment_is_free
 from ..surface.lengths import inverse
 from ..surface.metric_rows import H11, H12, H22, fill_row
 from ..surface.surfaces import Metric
@@ -215,46 +214,6 @@ def rho_of(node, side):
     if side >= 4:
         return np.float64(node.rho2)
     return np.float64(node.rho1) if side >= 2 else np.float64(node.rho0)
-
-
-@inner_kernel
-def blocked_side(space, grid, n, vector, links, side):
-    """The bits of one side whose segments, one and two vectors long, are not free."""
-    x, y = grid.x0 + n % grid.nx * grid.dx, grid.y0 + n // grid.nx * grid.dy
-    dx, dy = vector.x * grid.dx, vector.y * grid.dy
-    one, two = 1 << side, 1 << side + SECOND
-    if links & two and segment_is_free(space, x, y, x + 2.0 * dx, y + 2.0 * dy):
-        return 0
-    if links & one and segment_is_free(space, x, y, x + dx, y + dy):
-        return two
-    return one | two
-
-
-@inner_kernel
-def free_edges(space, grid, n):
-    """The bits of the nodes around node n that can be reached along a free edge."""
-    bits = around_inside(grid, n % grid.nx, n // grid.nx)
-    x, y = grid.x0 + n % grid.nx * grid.dx, grid.y0 + n // grid.nx * grid.dy
-    for k in range(AROUND):
-        e = around(k)
-        if bits >> k & 1 and not segment_is_free(space, x, y, x + e.x * grid.dx, y + e.y * grid.dy):
-            bits &= ~(1 << k)
-    return bits
-
-
-@kernel
-def cut_links(space, grid, nodes):
-    """Remove all links that cross or touch an obstacle."""
-    for n in range(nodes.shape[0]):
-        node = nodes[n]
-        before = np.int64(node.links)
-        links = before
-        for side in range(6):
-            if links >> side & 1:
-                links &= ~blocked_side(space, grid, n, vector_of(node, side), links, side)
-        if node.around or (before ^ links) & ALL_SIDES:
-            node.around = free_edges(space, grid, n)
-        node.links = links
 
 
 @kernel
