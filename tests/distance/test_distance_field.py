@@ -345,6 +345,25 @@ def test_a_costly_field_is_at_least_the_least_cost_times_the_chord():
     assert np.median(field.values / np.maximum(walk, 1e-9)) <= 1.02
 
 
+def test_costs_that_leap_by_many_powers_of_ten_end():
+    random = np.random.default_rng(0)
+    axis, costs = np.arange(12.0), 10.0 ** random.uniform(-8.0, 8.0, (12, 12))
+    surface = tp.Surface.from_grid(
+        np.array([0.0 * costs, costs]), axis, axis, kinds=["rise", "cost"]
+    )
+    field = tp.distance_field(surface, (1.0, 1.0), spacing=0.1)
+    assert np.isfinite(field.values).all()
+    assert (field.values >= surface.least_cost * chords_to_nodes(field) * (1.0 - 1e-12)).all()
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_on_a_lattice_of_few_nodes_a_node_has_its_own_value(size):
+    random, axis = np.random.default_rng(0), np.arange(4.0)
+    surface = tp.Surface.from_grid(random.random((4, 4)), axis, axis)
+    field = tp.distance_field(surface, (0.2, 0.3), spacing=3.0 / (size - 1))
+    assert field.at((3.0, 3.0)) <= field.values[-1, -1] * (1.0 + 1e-12)
+
+
 def test_a_limit_leaves_out_what_is_farther():
     problem = tp.scenes.load("one-peak")
     medium = Medium(problem.surface, tp.Lattice.spanning(problem.bounds, 0.2), problem.free_space)

@@ -7,7 +7,7 @@ import pytest
 import terrapath as tp
 from processes import in_another_process
 from terrapath.planners import PLANNERS, Finished, make_planner, plan_tour
-from terrapath.planners.base import least_limit, options_of
+from terrapath.planners.base import PROVING, least_limit, options_of
 
 NOTHING = 1e-9  # seconds
 LONG = 3600.0
@@ -32,7 +32,7 @@ def test_every_planner_keeps_the_time_limit_of_a_call(name, problem):
     make_planner(name, **SLOW.get(name, {})).solve(
         problem, callback=seen.append, time_limit=NOTHING
     )
-    assert len(seen) == 1
+    assert len([progress for progress in seen if progress.stage != PROVING]) == 1
     assert seen[0].samples < seen[0].total
 
 
@@ -41,7 +41,7 @@ def test_of_two_time_limits_the_lower_counts(name, problem):
     seen = []
     planner = make_planner(name, time_limit=NOTHING, **SLOW.get(name, {}))
     planner.solve(problem, callback=seen.append, time_limit=LONG)
-    assert len(seen) == 1
+    assert len([progress for progress in seen if progress.stage != PROVING]) == 1
     assert least_limit(None, None) is None
     assert least_limit(2.0, None) == least_limit(None, 2.0) == least_limit(3.0, 2.0) == 2.0
 

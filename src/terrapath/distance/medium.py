@@ -100,6 +100,7 @@ class Medium:
             tau=np.full(count, math.inf),
             best=np.full(count, hopf_lax.SEED, np.uint8),
             queued=np.zeros(count, np.uint8),
+            times=np.zeros(count, np.uint8),
             links=np.zeros(count, calendar_queue.LINK),
         )
         seeds, values = self._seeds(source, SEED_RADIUS)

@@ -20,6 +20,8 @@ MOMENT = 1e-9
 
 # What stopped a search that Ctrl-C ended.
 INTERRUPT = "interrupt"
+# What stopped a search whose time was up.
+TIME_LIMIT = "time limit"
 
 # Where no path is found, the lattice may be too coarse to see a gap. Its spacing is halved this
 # many times.
@@ -86,7 +88,7 @@ class Stopper:
     def is_late(self) -> bool:
         """Is the time up? The callback is not asked."""
         if self.time_limit is not None and self.seconds >= self.time_limit:
-            self.stopped_by = "time limit"
+            self.stopped_by = TIME_LIMIT
             return True
         return False
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from ..problem import Path, Problem
-from .base import INTERRUPT, Callback, FirstPath, Progress, TreeOptions
+from .base import INTERRUPT, TIME_LIMIT, Callback, FirstPath, Progress, TreeOptions
 from .grid_search import AStar
 
 # The first lattice has between so many nodes on a side, so that it shows valleys and gaps, and so
@@ -15,8 +15,6 @@ FEWEST_NODES, MOST_NODES, MOST_ON_ROUGH = 100, 200, 500
 
 # The neighbours of a node. With fewer a search is hardly quicker, and oftener in a wrong valley.
 NEIGHBOURS = 32
-
-TIME_LIMIT = "time limit"
 
 
 def coarse_spacing(problem: Problem, is_rough: bool = False) -> float:

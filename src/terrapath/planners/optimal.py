@@ -18,10 +18,12 @@ from ..geodesics.visibility import is_flat, shortest_taut_path
 from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice, Spacing
 from ..surface.bounds import Bounds
+from ..surface.metric import is_rough
 from ..validation import require_count, require_positive
 from .base import (
     INTERRUPT,
     SEARCHING,
+    TIME_LIMIT,
     Callback,
     Progress,
     Stopper,
@@ -117,6 +119,7 @@ class _Run:
         self.samples, self.total = 0, 2 * first.nx * first.ny
         self.direct: Path | None = None
         self.found: list[Path] = []
+        self.searched: dict[AStar | RRTStar, Path | None] = {}
         self.failures: list[Exception] = []
         self.trying = SEARCHING
         self.is_exact = self.is_sure = False
@@ -148,21 +151,28 @@ class _Run:
             self.stopper.stopped_by = INTERRUPT
         self.tell_failures()
         solution = self.answer()
-        if solution.path is None or self.stopper.stopped_by:
+        if solution.path is None or self.stopper.stopped_by not in ("", TIME_LIMIT):
             return solution
-        return self.proven(solution)
+        return self.proven(solution)  # without time, it is at least the chord
 
-    def searches(self) -> Iterator[tuple[str, Callable[[], None]]]:
+    def searches(self) -> Iterator[tuple[str, Callable[[], object]]]:
         """The searches in their order, with what the progress calls each."""
         yield "trying the straight line", self.try_straight_line
         if is_flat(self.problem):
             yield "trying the corners of obstacles", self.try_corners
+        elif is_rough(self.problem.surface, self.problem.bounds):
+            # The fields' own paths are long there before they are refined, which takes its time.
+            for what, planner in self.planners():
+                yield what, partial(self.search, planner)
         yield "trying distance fields", self.try_fields
         yield "trying finer fields", self.try_finer_fields
+        for what, planner in self.planners():
+            yield what, partial(self.try_planner, planner)
+
+    def planners(self) -> Iterator[tuple[str, AStar | RRTStar]]:
         for neighbours in NEIGHBOURS:
-            what = f"trying A* with {neighbours} neighbours"
-            yield what, partial(self.try_planner, AStar(neighbours=neighbours))
-        yield "trying a tree", partial(self.try_planner, RRTStar())
+            yield f"trying A* with {neighbours} neighbours", AStar(neighbours=neighbours)
+        yield "trying a tree", RRTStar()
 
     # Searches
 
@@ -212,17 +222,27 @@ class _Run:
         return float(self.fields[0].at(self.problem.goal))
 
     def try_planner(self, planner: AStar | RRTStar) -> None:
+        """Refine the path of another planner."""
+        path = self.search(planner)
+        if path is not None:
+            self.refine(path)
+
+    def search(self, planner: AStar | RRTStar) -> Path | None:
+        """The path of another planner, which searches once."""
+        if planner in self.searched:
+            return self.searched[planner]
         solution = planner.solve(
             self.problem,
             callback=lambda progress: self.must_stop(progress.samples),
             time_limit=self.stopper.seconds_left,
         )
         self.samples += solution.samples
+        path = self.searched[planner] = solution.path
+        if path is not None and path.length < self.best:
+            self.direct = path
         if solution.status is Status.INTERRUPTED:
-            self.keep_as_it_is(solution.path)
             raise KeyboardInterrupt
-        if solution.path is not None:
-            self.refine(solution.path)
+        return path
 
     def try_finer_fields(self) -> None:
         """Fields on ever finer lattices, where a shorter route could lead."""
@@ -279,10 +299,6 @@ class _Run:
         except Exception as error:
             self.failures.append(error)
 
-    def keep_as_it_is(self, path: Path | None) -> None:
-        if path is not None and path.length < self.best:
-            self.direct = path
-
     def keep(self, route: Path) -> None:
         """Keep a route unless it is one of those that are known."""
         for k, other in enumerate(self.found):
@@ -325,17 +341,26 @@ class _Run:
         )
 
     def proven(self, solution: Solution) -> Solution:
-        """The solution with the best lower bound that the time allows."""
+        """The solution with the best lower bound that the time allows.
+
+        Among obstacles on flat ground the path is exact, and bounds say little: one is enough.
+        """
         target = self.planner.target_gap
         solution = with_bound(
             solution,
-            target_gap=target,
+            target_gap=None if self.is_exact else target,
             time_limit=self.stopper.seconds_left,
             callback=self.stopper.must_stop,
         )
         if solution.status is Status.INTERRUPTED:
             return solution
-        met = solution.gap is not None and solution.gap <= target
         self.stopper.is_late()
-        reason = "gap met" if met else self.stopper.stopped_by or "finest lattice"
-        return replace(solution, stopped_by=reason)
+        return replace(solution, stopped_by=self.reason(solution))
+
+    def reason(self, solution: Solution) -> str:
+        """What ended the run."""
+        if solution.gap is not None and solution.gap <= self.planner.target_gap:
+            return "gap met"
+        if self.stopper.stopped_by:
+            return self.stopper.stopped_by
+        return "exact on flat ground" if self.is_exact else "finest lattice"

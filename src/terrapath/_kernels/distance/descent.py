@@ -228,43 +228,12 @@ def best_on_ring(surface, space, field, best, h, ring, x, y):
     return best
 
 
-@inner_kernel
-def is_open(space, field, i, j, x, y):
-    """Is a node of a ring settled and seen from (x, y), or outside the lattice?"""
-    grid = field.grid
-    if not (0 <= i < grid.nx and 0 <= j < grid.ny):
-        return True
-    if field.u[j, i] == math.inf:
-        return False
-    px, py = grid.x0 + i * grid.dx, grid.y0 + j * grid.dy
-    return not field.has_obstacles or segment_is_free(space, x, y, px, py)
-
-
-@kernel
-def ring_is_open(space, field, ring, x, y):
-    """Can all nodes of a ring be seen, so that every path crosses it?"""
-    grid = field.grid
-    if ring.i0 < 0 and ring.j0 < 0 and ring.i1 >= grid.nx and ring.j1 >= grid.ny:
-        return False
-    for i in range(ring.i0, ring.i1 + 1):
-        if not (
-            is_open(space, field, i, ring.j0, x, y) and is_open(space, field, i, ring.j1, x, y)
-        ):
-            return False
-    for j in range(ring.j0, ring.j1 + 1):
-        if not (
-            is_open(space, field, ring.i0, j, x, y) and is_open(space, field, ring.i1, j, x, y)
-        ):
-            return False
-    return True
-
-
 @kernel
 def approach(surface, space, field, x, y, level):
     """The best last segment of a path to (x, y), from nearby nodes or from the source.
 
-    It begins where u is less than ``level``; ``end`` is infinite where there is none. A smaller
-    ring of nodes is tried only where something blocks the view of the larger one.
+    It begins where u is less than ``level``; ``end`` is infinite where there is none. Tried are the
+    corners of the cell, and the ring of nodes around these.
     """
     grid, best = field.grid, Approach(x, y, math.inf, math.inf, level)
     if nodes_apart(grid, x, y, field.source_x, field.source_y) <= RING + 1.0:
@@ -273,8 +242,6 @@ def approach(surface, space, field, x, y, level):
     for r in range(RING, -1, -1):
         ring = ring_around(grid, x, y, r)
         best = best_on_ring(surface, space, field, best, h, ring, x, y)
-        if ring_is_open(space, field, ring, x, y):
-            break
     return best
 
 

@@ -50,13 +50,15 @@ class State(NamedTuple):
     tau: np.ndarray  # (n,) float64: u over the chord
     best: np.ndarray  # (n,) uint8: the direction of the edge that offers least, or SEED
     queued: np.ndarray  # (n,) uint8
+    times: np.ndarray  # (n,) uint8: how often it was settled, up to MOST_TIMES
     links: np.ndarray  # (n,) of calendar_queue.LINK
 
 
 SEED = 255
 
-# A settled node is queued again for values that are less by more than this share.
-GAIN = 1e-6
+# A settled node is queued again for values that are less by more than this share. From so many
+# times on the share doubles each time, so that a march ends where costs leap by many powers of ten.
+GAIN, SELDOM, MOST_TIMES = 1e-6, 16, 34
 
 # A node this near to the source, in nodes, is the source.
 AT_SOURCE = 1e-9
@@ -325,7 +327,9 @@ def settle(medium, front, state, source, n):
         if math.hypot(node.x, node.y) > AT_SOURCE * medium.grid.dx:
             state.tau[n] = value / chord_of(medium, source, node)
     # From now on only what is less by a share is an offer.
-    front.trial[n] = front.u[n] * (1.0 - GAIN)
+    times = min(int(state.times[n]) + 1, MOST_TIMES)
+    state.times[n] = times
+    front.trial[n] = front.u[n] * (1.0 - GAIN * (1 << max(times - SELDOM, 0)))
 
 
 @inner_kernel

@@ -277,7 +277,8 @@ def refresh_buckets(tree, options, radius):
 
 # A sample beside the best path is left out where more than this many times log n of the tree's n
 # vertices are within the near radius. Uniform samples alone make 13.5 log n with the default
-# radius where none is left out. So a sample has O(log n) candidates, and no uniform one is left out.
+# radius where none is left out. So a sample has O(log n) candidates, and no uniform one is
+# left out.
 CROWD = 30.0
 
 # In a crowd a sample is still kept where it shortens the best path by this share. That can happen
