@@ -182,7 +182,7 @@ def compare_optimal(trial: Trial, answers: dict[str, Answer], best: str, least: 
     if math.isfinite(there + back) and not math.isclose(there, back, rel_tol=SAME):
         cut = answers["optimal"].cut or answers["reversed"].cut
         trial.fault(f"reversal{cut}", "optimal", f"{there:.10g}, back {back / there - 1:+.1e}")
-    if math.isfinite(there) and "rrt-star-r" in answers:
+    if 0.0 < there < math.inf and "rrt-star-r" in answers:
         trial.figure("rrt-star-r / optimal", answers["rrt-star-r"].value / there)
 
 

@@ -298,6 +298,16 @@ def test_among_boxes_on_flat_ground_it_is_exact():
     assert solution.path.line.disjoint(shapely.union_all(boxes))
 
 
+def test_a_route_that_touches_does_not_hide_the_others(monkeypatch):
+    wall = shapely.box(4.0, -1.0, 5.0, 6.0)
+    problem = tp.Problem(FLAT, (0.0, 0.0), (9.0, 0.0), REGION, [wall])
+    through = problem.path([(0.0, 0.0), (9.0, 0.0)])
+    monkeypatch.setattr(optimal, "refine", lambda problem, path, **options: through)
+    solution = tp.plan(problem, "optimal", target_gap=10.0)
+    assert solution.status is tp.Status.SOLVED
+    assert solution.path.line.disjoint(wall)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not REAL_MAPS.exists(), reason="the real maps are not beside this clone")
 def test_the_steep_volcano():

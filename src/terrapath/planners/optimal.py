@@ -208,8 +208,7 @@ class _Run:
         path = self.fields[0].path_to(problem.goal)
         if path is None:
             return False
-        if path.length < self.best:
-            self.direct = path
+        self.keep_unrefined(path)
         if not self.must_stop():
             self.refine_routes(routes)
         is_close = abs(self.distance - self.best) <= SURE * self.best
@@ -238,8 +237,8 @@ class _Run:
         )
         self.samples += solution.samples
         path = self.searched[planner] = solution.path
-        if path is not None and path.length < self.best:
-            self.direct = path
+        if path is not None:
+            self.keep_unrefined(path)
         if solution.status is Status.INTERRUPTED:
             raise KeyboardInterrupt
         return path
@@ -299,8 +298,15 @@ class _Run:
         except Exception as error:
             self.failures.append(error)
 
+    def keep_unrefined(self, path: Path) -> None:
+        """Keep a path, for what is returned if nothing better comes, where it is the shortest."""
+        if path.length < self.best and self.problem.allows(path):
+            self.direct = path
+
     def keep(self, route: Path) -> None:
-        """Keep a route unless it is one of those that are known."""
+        """Keep a route unless it touches an obstacle, or is one of those that are known."""
+        if not self.problem.allows(route):
+            return
         for k, other in enumerate(self.found):
             if is_same(self.problem, route, other):
                 if route.length < other.length:
