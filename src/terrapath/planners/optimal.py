@@ -120,6 +120,7 @@ class _Run:
         self.direct: Path | None = None
         self.found: list[Path] = []
         self.searched: dict[AStar | RRTStar, Path | None] = {}
+        self.tried: set[AStar | RRTStar] = set()
         self.failures: list[Exception] = []
         self.trying = SEARCHING
         self.is_exact = self.is_sure = False
@@ -162,17 +163,14 @@ class _Run:
             yield "trying the corners of obstacles", self.try_corners
         elif is_rough(self.problem.surface, self.problem.bounds):
             # The fields' own paths are long there before they are refined, which takes its time.
-            for what, planner in self.planners():
-                yield what, partial(self.search, planner)
+            yield "trying A*", partial(self.try_planner, AStar())
+            yield "trying a tree", partial(self.search, RRTStar())
         yield "trying distance fields", self.try_fields
         yield "trying finer fields", self.try_finer_fields
-        for what, planner in self.planners():
-            yield what, partial(self.try_planner, planner)
-
-    def planners(self) -> Iterator[tuple[str, AStar | RRTStar]]:
         for neighbours in NEIGHBOURS:
-            yield f"trying A* with {neighbours} neighbours", AStar(neighbours=neighbours)
-        yield "trying a tree", RRTStar()
+            what = f"trying A* with {neighbours} neighbours"
+            yield what, partial(self.try_planner, AStar(neighbours=neighbours))
+        yield "trying a tree", partial(self.try_planner, RRTStar())
 
     # Searches
 
@@ -221,9 +219,10 @@ class _Run:
         return float(self.fields[0].at(self.problem.goal))
 
     def try_planner(self, planner: AStar | RRTStar) -> None:
-        """Refine the path of another planner."""
+        """Refine the path of another planner, once."""
         path = self.search(planner)
-        if path is not None:
+        if path is not None and planner not in self.tried:
+            self.tried.add(planner)
             self.refine(path)
 
     def search(self, planner: AStar | RRTStar) -> Path | None:
