@@ -8,6 +8,9 @@ from collections.abc import Callable
 # Called with the name of a stage, how much of it is done, and how much there is in all.
 Watch = Callable[[str, int, int], None]
 
+# Called now and then with how many nodes are settled; returning True stops the work.
+WatchCount = Callable[[int], bool | None]
+
 # Asked by long work about every tenth of a second, or more often, whether it must stop; then it
 # ends with what it has. Once True, always True, so that each loop of nested ones sees it.
 MustStop = Callable[[], bool]

@@ -7,22 +7,18 @@ slopes, and its metric can be changed node by node.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
 from .._kernels.distance import calendar_queue, dependents, eikonal as kernels, stencils
 from .._kernels.surface.metric_rows import ROWS, columns_of
+from .._support.watching import WatchCount
 from ..errors import InputError
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, as_array
 from .source import SourceModel
-
-# The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
-BUCKET_SHARE = 4.0
-BUCKETS = 2**14
 
 # Nodes settled between two checks of the callback and of Ctrl-C.
 CHUNK = 100_000
@@ -34,9 +30,6 @@ MOST_NODES = (2**31 - 1) // 14
 
 # The nodes of a lattice as kernels store them, (ny * nx,) of ``stencils.NODE``.
 Nodes = npt.NDArray[np.void]
-
-# Is called with the number of nodes settled so far; returning True stops the march.
-Watch = Callable[[int], bool | None]
 
 
 class Eikonal:
@@ -94,7 +87,7 @@ class Eikonal:
         return dependents.Dependents(first, entries)
 
     def march(
-        self, model: SourceModel, *, limit: float = math.inf, watch: Watch | None = None
+        self, model: SourceModel, *, limit: float = math.inf, watch: WatchCount | None = None
     ) -> Array:
         """Distances (ny, nx) from the source, map units; infinite where not reached.
 
@@ -103,7 +96,7 @@ class Eikonal:
         """
         lattice = self.lattice
         source = kernels.Source(*model[:5])
-        front = self._front(model)
+        front = calendar_queue.front_of(lattice.data, self.typical_cost, model.seed_values)
         rows = slice(model.row, model.row + model.values.shape[0])
         columns = slice(model.column, model.column + model.values.shape[1])
         window = self.nodes["links"].reshape(lattice.ny, lattice.nx)[rows, columns]
@@ -117,27 +110,12 @@ class Eikonal:
             window &= ~np.uint16(stencils.WINDOW)
         return front.u.reshape(lattice.ny, lattice.nx)
 
-    def _front(self, model: SourceModel) -> calendar_queue.Front:
-        lattice, count = self.lattice, len(self.nodes)
-        width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
-        width *= self.typical_cost
-        front = calendar_queue.Front(
-            u=np.full(count, np.inf),
-            trial=np.full(count, np.inf),
-            heads=np.full(BUCKETS, -1, np.int32),
-            days_per_unit=1.0 / width,
-            counters=np.zeros(2, np.int64),
-        )
-        if len(model.seeds):
-            front.counters[calendar_queue.DAY] = int(model.seed_values.min() / width)
-        return front
-
     def _settle(
         self,
         front: calendar_queue.Front,
         source: kernels.Source,
         limit: float,
-        watch: Watch | None,
+        watch: WatchCount | None,
     ) -> None:
         settled = 0
         while True:

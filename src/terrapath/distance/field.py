@@ -14,13 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.distance import descent
+from .._support.watching import WatchCount
 from ..errors import OutsideSurfaceError
 from ..problem import Path, Problem
 from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import Lattice
 from ..surface import Surface
 from ..validation import Array, Point, PointLike, as_point, as_points
-from .medium import EdgeTree, Medium, Watch, lift_of
+from .medium import EdgeTree, Medium, lift_of
 
 if TYPE_CHECKING:
     from ..space.constraints import Area
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 # The length of a step on a path back to the source, in nodes.
 STEP = 0.5
 
-# A path down the field that is this many times as long as the field says has lost its way, on very
+# A path down the field that is this many times as long as the field says went astray, on very
 # rough ground.
 ASTRAY = 1.1
 
@@ -153,7 +154,7 @@ def march_from(
     source: tuple[float, float],
     *,
     limit: float = math.inf,
-    watch: Watch | None = None,
+    watch: WatchCount | None = None,
 ) -> DistanceField:
     """The distance field of one source in a medium that is prepared already.
 
@@ -164,7 +165,7 @@ def march_from(
 
 
 def march_both(
-    medium: Medium, start: Point, goal: Point, *, watch: Watch | None = None
+    medium: Medium, start: Point, goal: Point, *, watch: WatchCount | None = None
 ) -> tuple[DistanceField, DistanceField]:
     """The distance fields of two sources, one on each core; see ``march_from``."""
     stop = Event()
@@ -191,7 +192,7 @@ def distance_field(
     max_slope: float | None = None,
     keep_in: Area | None = None,
     spacing: float | None = None,
-    watch: Watch | None = None,
+    watch: WatchCount | None = None,
 ) -> DistanceField:
     """Distances on the surface from a start to everywhere, by fast marching.
 
@@ -216,7 +217,7 @@ def distance_field(
 
 
 def field_of(
-    problem: Problem, *, spacing: float | None = None, watch: Watch | None = None
+    problem: Problem, *, spacing: float | None = None, watch: WatchCount | None = None
 ) -> DistanceField:
     """Distances from a problem's start through its free space; see ``distance_field``."""
     surface = problem.surface

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy.typing as npt
 
 from .._kernels.distance import calendar_queue, ground, hopf_lax, star
 from .._kernels.surface.metric_rows import columns_of, fill_samples
-from .._support.watching import MustStop, never
+from .._support.watching import MustStop, WatchCount, never
 from ..errors import InputError
 from ..space.free_space import FreeSpace
 from ..space.lattice import Lattice
@@ -19,17 +18,13 @@ from ..surface import Surface
 from ..surface.metric import chord, feature_size
 from ..validation import Array, PointLike
 
-# The width of a bucket of the queue: this many spacings of nodes, divided by the nodes of a side.
-BUCKET_SHARE = 4.0
-BUCKETS = 2**14
-
 # Nodes settled between two checks of the callback and of Ctrl-C.
 CHUNK = 20_000
 
 # The edges of all nodes are numbered in 31 bits; on the steepest ground a node has 64.
 MOST_NODES = (2**31 - 1) // (2 * star.HALF)
 
-# Nodes within this distance of the source, in nodes, are seeds: a straight way leads there. It is
+# Nodes within this distance of the source, in nodes, are seeds: a straight path leads there. It is
 # the length of the longest edge, so that no segment of a star lies beyond the source.
 SEED_RADIUS = 5.9
 
@@ -41,9 +36,6 @@ REACH = 3.0
 MOST_PIECES = 4
 # On smooth ground a piece may be longer than an edge: it is this share of a feature.
 FEATURES_PER_PIECE = 0.5
-
-# Is called with the number of nodes settled so far; returning True stops the march.
-Watch = Callable[[int], bool | None]
 
 
 class EdgeTree(NamedTuple):
@@ -70,13 +62,12 @@ class Medium:
         self.surface, self.lattice, self.free_space = surface, lattice, free_space
         self.ground = _sample(surface, lattice)
         self.stars = _lay_stars(self.ground, lattice, free_space, must_stop)
-        self.steps = star.NORTH * lattice.nx + star.EAST
         per = 2 * self.ground.pieces
         self.data = hopf_lax.Medium(
             self.ground,
             np.stack([z[::per, ::per].ravel() for z in self.ground.heights], axis=-1),
             self.stars,
-            self.steps,
+            star.NORTH * lattice.nx + star.EAST,
             (per * np.abs(star.DIRECTIONS).max(axis=1) <= self.ground.reach).astype(np.uint8),
             free_space.data,
             lattice.data,
@@ -84,7 +75,11 @@ class Medium:
         )
 
     def march(
-        self, source: tuple[float, float], *, limit: float = math.inf, watch: Watch | None = None
+        self,
+        source: tuple[float, float],
+        *,
+        limit: float = math.inf,
+        watch: WatchCount | None = None,
     ) -> tuple[Array, Array]:
         """Distances from a source, map units, and these over the chord: both (ny, nx).
 
@@ -93,9 +88,7 @@ class Medium:
         stops the march.
         """
         lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
-        place = (np.asarray(source) - lattice.bounds[:2]) / (lattice.dx, lattice.dy)
-        lift = lift_of(self.surface, source)
-        begin = hopf_lax.Source(float(place[0]), float(place[1]), lift)
+        begin = hopf_lax.Source(*self._place(source), lift_of(self.surface, source))
         state = hopf_lax.State(
             tau=np.full(count, math.inf),
             best=np.full(count, hopf_lax.SEED, np.uint8),
@@ -104,7 +97,7 @@ class Medium:
             links=np.zeros(count, calendar_queue.LINK),
         )
         seeds, values = self._seeds(source, SEED_RADIUS)
-        front = self._front(values)
+        front = calendar_queue.front_of(lattice.data, self.surface.typical_cost, values)
         state.tau[seeds] = float(self.surface.cost(np.asarray(source)))
         hopf_lax.plant(front, state, seeds, values)
         settled, chunk = 0, CHUNK
@@ -116,13 +109,18 @@ class Medium:
         shape = (lattice.ny, lattice.nx)
         return front.u.reshape(shape), state.tau.reshape(shape)
 
+    def _place(self, point: PointLike) -> tuple[float, float]:
+        """Column and row of a point, in nodes."""
+        lattice = self.lattice
+        x, y = (np.asarray(point) - lattice.bounds[:2]) / lattice.spacing
+        return float(x), float(y)
+
     def _seeds(self, source: PointLike, radius: float) -> tuple[npt.NDArray[np.int64], Array]:
         """The nodes near a source that a free segment leads to, and their distances.
 
         radius : in nodes.
         """
-        lattice = self.lattice
-        place = (np.asarray(source) - lattice.bounds[:2]) / (lattice.dx, lattice.dy)
+        lattice, place = self.lattice, self._place(source)
         rows, columns = (
             np.arange(max(math.ceil(at - radius), 0), min(math.floor(at + radius), last) + 1)
             for at, last in ((place[1], lattice.ny - 1), (place[0], lattice.nx - 1))
@@ -135,7 +133,7 @@ class Medium:
         seeds = (rows * lattice.nx + columns)[near].astype(np.int64)
         costs, per = np.empty(len(seeds)), 2 * self.ground.pieces
         nodes = np.column_stack([columns[near], rows[near]]).astype(np.float64)
-        ground.fill_rays(self.ground, *(per * place).tolist(), per * nodes, costs)
+        ground.fill_rays(self.ground, per * place[0], per * place[1], per * nodes, costs)
         least = chord(self.surface, np.broadcast_to(source, points[near].shape), points[near])
         return seeds, np.maximum(costs, least)
 
@@ -147,7 +145,7 @@ class Medium:
         count = self.lattice.nx * self.lattice.ny
         beside, values = self._seeds(source, SEED_RADIUS)
         tails = np.repeat(np.arange(count), np.diff(self.stars.first))
-        heads = tails + self.steps[self.stars.directions]
+        heads = tails + self.data.steps[self.stars.directions]
         # The source is one more node.
         pairs = (np.append(tails, np.full(len(beside), count)), np.append(heads, beside))
         costs = np.append(self.stars.costs, values)
@@ -168,21 +166,6 @@ class Medium:
         while (before := int(tree.before[nodes[-1]])) < len(tree.before) - 1:
             nodes.append(before)
         return np.array(nodes)
-
-    def _front(self, values: Array) -> calendar_queue.Front:
-        lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
-        width = BUCKET_SHARE * math.sqrt(lattice.dx * lattice.dy) / max(lattice.nx, lattice.ny)
-        width *= self.surface.typical_cost
-        front = calendar_queue.Front(
-            u=np.full(count, np.inf),
-            trial=np.full(count, np.inf),
-            heads=np.full(BUCKETS, -1, np.int32),
-            days_per_unit=1.0 / width,
-            counters=np.zeros(2, np.int64),
-        )
-        if len(values):
-            front.counters[calendar_queue.DAY] = int(values.min() / width)
-        return front
 
 
 def _sample(surface: Surface, lattice: Lattice) -> ground.Ground:

@@ -64,7 +64,8 @@ def alternatives(
     medium = Medium(problem.surface, lattice, problem.free_space)
     fields = march_both(medium, problem.start, problem.goal)
     failures: list[Exception] = []
-    found = list(routes_of_fields(problem, fields[0], fields[1], count, failed=failures.append))
+    direct = fields[0].path_to(problem.goal)
+    found = list(routes_of_fields(problem, fields, direct, count, failed=failures.append))
     if failures and not found:
         raise failures[0]
     if failures:
@@ -79,8 +80,8 @@ def shortest(routes: Iterable[Path], count: int) -> tuple[Path, ...]:
 
 def routes_of_fields(
     problem: Problem,
-    from_start: DistanceField,
-    from_goal: DistanceField,
+    fields: tuple[DistanceField, DistanceField],
+    direct: Path | None,
     count: int,
     *,
     only_shorter: bool = False,
@@ -90,16 +91,19 @@ def routes_of_fields(
 ) -> Iterator[Path]:
     """Distinct routes, each as soon as it is refined; the path down the fields comes first.
 
-    from_start, from_goal : distance fields on one lattice. count : routes that are asked for; more
-    are tried, because a later one may be shorter. only_shorter : then only those that may be
+    fields : from the start and from the goal, on one lattice. direct : the path down the first; no
+    routes where it is None. count : routes that are asked for; more are tried, because a later one
+    may be shorter. only_shorter : then only those that may be
     shorter than all before, as far as the fields are right about the best. failed : is called with
     the error where a route cannot be refined. must_stop : is asked after each candidate whether to
     end the search. is_late : is asked many times a second; when it says True, the route in hand is
     not refined any further.
     """
+    if direct is None:
+        return
     found: list[Path] = []
-    value = float(from_start.at(problem.goal))
-    for tries, candidate in enumerate(_candidates(problem, from_start, from_goal), 1):
+    value = float(fields[0].at(problem.goal))
+    for tries, candidate in enumerate(_candidates(problem, fields, direct, value), 1):
         if only_shorter and len(found) >= count:
             best = min(route.length for route in found)
             doubt = min(abs(best / value - 1.0), MOST_DOUBT) + SAME_VALUE
@@ -125,13 +129,13 @@ class _Candidate(NamedTuple):
 
 
 def _candidates(
-    problem: Problem, from_start: DistanceField, from_goal: DistanceField
+    problem: Problem, fields: tuple[DistanceField, DistanceField], direct: Path, value: float
 ) -> Iterator[_Candidate]:
-    """Paths down both fields, then routes through the nodes of least detour, away from others."""
-    direct = from_start.path_to(problem.goal)
-    if direct is None:
-        return
-    value = float(from_start.at(problem.goal))
+    """Paths down both fields, then routes through the nodes of least detour, away from others.
+
+    direct : down the first field. value : how long that one says it is, map units.
+    """
+    from_start, from_goal = fields
     yield _Candidate(direct, value)
     lattice = from_start.lattice
     back = from_goal.path_to(problem.start)

@@ -8,7 +8,6 @@ at places beside the corners, at a tiny clearance.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ import shapely
 from .._kernels.geodesics import sight, visibility as kernels
 from .._kernels.space.free_space import list_edges
 from .._kernels.surface.surfaces import Peaks, Spline
+from .._support.watching import WatchCount
 from ..errors import InputError
 from ..problem import Path, Problem
 from ..space.free_space import (
@@ -68,9 +68,6 @@ FEWEST_SIDES, MOST_SIDES = 64, 4096
 # So many corners are settled before the search may be stopped.
 CHUNK = 256
 
-# Called now and then with the number of corners settled; returning True stops the search.
-Watch = Callable[[int], bool]
-
 
 class Taut(NamedTuple):
     """What the search found.
@@ -110,7 +107,7 @@ def _spline_is_flat(data: Spline, bounds: Bounds) -> bool:
     return change <= FLATNESS and (logs.size == 0 or float(np.ptp(logs)) <= FLATNESS)
 
 
-def shortest_taut_path(problem: Problem, *, watch: Watch | None = None) -> Taut:
+def shortest_taut_path(problem: Problem, *, watch: WatchCount | None = None) -> Taut:
     """The shortest path of a problem on flat ground, to 1e-7 relative.
 
     Discs are replaced by polygons around them: the path is longer by less than 3e-7, relative,

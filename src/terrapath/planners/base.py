@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Protocol
 
 from ..problem import Path, Problem, Solution, Status
-from ..space.lattice import Lattice, Spacing
+from ..space.lattice import Lattice, Spacing, as_spacing
 from ..validation import require_positive
 
 # Why a search was not needed: it is proven that there is no path.
@@ -268,7 +268,7 @@ def lattices(
     default, nodes lie at the centres of the problem's cells; a lattice then need not reach the
     edge of the bounds.
     """
-    first = Spacing(spacing, spacing) if spacing else problem.default_spacing
+    first = as_spacing(spacing or problem.default_spacing)
     cells = problem.cells
     for halvings in range(HALVINGS + 1):
         step = Spacing(first.x * 0.5**halvings, first.y * 0.5**halvings)

@@ -6,7 +6,15 @@ import math
 from dataclasses import replace
 
 from ..problem import Path, Problem
-from .base import INTERRUPT, TIME_LIMIT, Callback, FirstPath, Progress, TreeOptions
+from .base import (
+    INTERRUPT,
+    TIME_LIMIT,
+    Callback,
+    FirstPath,
+    Progress,
+    TreeOptions,
+    seconds_left,
+)
 from .grid_search import AStar
 
 # The first lattice has between so many nodes on a side, so that it shows valleys and gaps, and so
@@ -45,8 +53,9 @@ def path_over_lattices(
         seen = Progress(0, options.samples, seconds + progress.seconds, math.inf)
         return callback is not None and bool(callback(seen))
 
-    if found.path is straight is None and found.stopped_by not in (INTERRUPT, TIME_LIMIT):
-        rest = None if options.time_limit is None else max(options.time_limit - seconds, 1e-9)
+    is_over = found.stopped_by in (INTERRUPT, TIME_LIMIT)
+    if found.path is None and straight is None and not is_over:
+        rest = seconds_left(options.time_limit, seconds)
         found = replace(coarse, spacing=None).solve(problem, callback=watch, time_limit=rest)
         seconds += found.seconds
     paths = [path for path in (found.path, straight) if path is not None]

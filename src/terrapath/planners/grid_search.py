@@ -17,6 +17,7 @@ from ..surface import Surface
 from ..validation import Array, require_count, require_positive
 from .base import (
     INTERRUPT,
+    TIME_LIMIT,
     Callback,
     Progress,
     answer_without_search,
@@ -271,7 +272,7 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
         return NO_WAY_ON
     if stopped:
         return "callback"
-    return "time limit" if search.is_late else ""
+    return TIME_LIMIT if search.is_late else ""
 
 
 def _run(search: _Search, callback: Callback | None) -> str:

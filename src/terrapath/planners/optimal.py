@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from ..distance.field import march_both
+from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
 from ..geodesics.alternatives import is_same, routes_of_fields, shortest
@@ -31,6 +31,7 @@ from .base import (
     lattices,
     least_limit,
     status_of,
+    straight_path,
 )
 from .finished import with_bound
 from .grid_search import AStar
@@ -66,8 +67,8 @@ class Optimal:
     and 8 neighbours, and a tree. All but the straight line are refined. The route from a start to a
     goal is the same as back.
 
-    ``stopped_by`` tells whether the gap was met. ``unrefined`` is the path down the distance
-    field; it is also the path returned where the run ends before a route was refined.
+    ``stopped_by`` tells whether the gap was met. ``unrefined`` is the shortest path before
+    refinement; it is also the path returned where the run ends before a route was refined.
     """
 
     target_gap: float = 1e-3
@@ -124,6 +125,7 @@ class _Run:
         self.failures: list[Exception] = []
         self.trying = SEARCHING
         self.is_exact = self.is_sure = False
+        self.fields: tuple[DistanceField, DistanceField]  # of both ends, on the last lattice
 
     @property
     def best(self) -> float:
@@ -175,9 +177,7 @@ class _Run:
     # Searches
 
     def try_straight_line(self) -> None:
-        problem = self.problem
-        if problem.free_space.segments_are_free([problem.start], [problem.goal]).all():
-            self.direct = problem.path([problem.start, problem.goal])
+        self.direct = straight_path(self.problem)
 
     def try_corners(self) -> None:
         """The exact shortest path on flat ground."""
@@ -208,7 +208,7 @@ class _Run:
             return False
         self.keep_unrefined(path)
         if not self.must_stop():
-            self.refine_routes(routes)
+            self.refine_routes(path, routes)
         is_close = abs(self.distance - self.best) <= SURE * self.best
         self.is_sure = self.is_exact or is_close
         return True
@@ -281,12 +281,13 @@ class _Run:
             self.failures.append(error)
         self.keep(path)
 
-    def refine_routes(self, count: int) -> None:
+    def refine_routes(self, direct: Path, count: int) -> None:
         """Refine the routes of the fields; each is kept as soon as it is done."""
         try:
             for route in routes_of_fields(
                 self.problem,
-                *self.fields,
+                self.fields,
+                direct,
                 count,
                 only_shorter=True,
                 failed=self.failures.append,

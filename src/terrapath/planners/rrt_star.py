@@ -28,6 +28,7 @@ from ..validation import (
 )
 from .base import (
     INTERRUPT,
+    TIME_LIMIT,
     Callback,
     FirstPath,
     Progress,
@@ -159,7 +160,7 @@ def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
     if math.isfinite(progress.best_cost) and progress.best_cost <= options.target_length:
         return "first path" if math.isinf(options.target_length) else "target length"
     if options.time_limit is not None and progress.seconds >= options.time_limit:
-        return "time limit"
+        return TIME_LIMIT
     if progress.samples >= options.samples:
         return "samples"
     return ""

@@ -47,7 +47,7 @@ def _freed(space: FreeSpace, point: Array) -> Array:
 
 
 def _detour(space: FreeSpace, a: Array, b: Array, halvings: int) -> list[Array] | None:
-    """The points to pass on the way from a to b; None where no way is found."""
+    """The points to pass between a and b; None where none are found."""
     if space.allows(np.array([a, b])):
         return []
     middle, across = 0.5 * (a + b), np.array([a[1] - b[1], b[0] - a[0]])

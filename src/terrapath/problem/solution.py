@@ -293,7 +293,7 @@ class Solution:
 
 def _kept(problem: Problem, path: Path | None) -> Path | None:
     """The path where the problem allows it, or one beside it that is allowed, or None."""
-    if path is None or problem.allows(path.points):
+    if path is None or problem.allows(path):
         return path
     from .mending import mended
 

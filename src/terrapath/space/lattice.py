@@ -38,6 +38,11 @@ class Spacing(NamedTuple):
     y: float
 
 
+def as_spacing(spacing: float | Spacing) -> Spacing:
+    """A spacing along both axes; a number is that of both."""
+    return spacing if isinstance(spacing, Spacing) else Spacing(spacing, spacing)
+
+
 def default_spacing(bounds: Bounds, features: Spacing) -> Spacing:
     """The default spacing of nodes. features : the size of the finest ones."""
     if features.x == features.y:
@@ -67,7 +72,7 @@ class Lattice:
 
         Raises InputError where that is more nodes than can be numbered.
         """
-        step = spacing if isinstance(spacing, Spacing) else Spacing(spacing, spacing)
+        step = as_spacing(spacing)
         require_positive(spacing=min(step))
         if max(bounds.width / step.x, bounds.height / step.y) > MOST_NODES:
             raise InputError(
@@ -92,7 +97,7 @@ class Lattice:
         Raises as ``spanning`` does.
         """
         spanning = cls.spanning(bounds, spacing)
-        step = spacing if isinstance(spacing, Spacing) else Spacing(spacing, spacing)
+        step = as_spacing(spacing)
         low_x, high_x, nx = _centres(bounds.x1_min, bounds.x1_max, step.x, cells.x, cells.dx)
         low_y, high_y, ny = _centres(bounds.x2_min, bounds.x2_max, step.y, cells.y, cells.dy)
         if min(nx, ny) < 2 or nx * ny > MOST_NODES:

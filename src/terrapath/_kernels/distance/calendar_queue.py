@@ -7,6 +7,7 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
+from ..space.free_space import Grid
 
 # The lists of the buckets: the next node in the list, -1 where none; the node before it, at the
 # head -2 - bucket.
@@ -27,6 +28,30 @@ class Front(NamedTuple):
     heads: np.ndarray  # (buckets,) int32: first node of each bucket, -1 where none
     days_per_unit: float  # 1 / width of a day
     counters: np.ndarray  # (2,) int64: QUEUED, DAY
+
+
+# The width of a bucket: this many spacings of nodes, divided by the nodes of a side.
+BUCKET_SHARE = 4.0
+BUCKETS = 2**14
+
+
+def front_of(grid: Grid, cost: float, values: np.ndarray) -> Front:
+    """An empty queue for the nodes of a grid, that begins on the day of the least of the values.
+
+    cost : a typical factor on lengths. values : of the nodes that will be queued first, map units.
+    """
+    count = grid.nx * grid.ny
+    width = BUCKET_SHARE * math.sqrt(grid.dx * grid.dy) / max(grid.nx, grid.ny) * cost
+    front = Front(
+        u=np.full(count, np.inf),
+        trial=np.full(count, np.inf),
+        heads=np.full(BUCKETS, -1, np.int32),
+        days_per_unit=1.0 / width,
+        counters=np.zeros(2, np.int64),
+    )
+    if len(values):
+        front.counters[DAY] = int(values.min() / width)
+    return front
 
 
 # Places in Front.counters.

@@ -141,7 +141,7 @@ def nodes_apart(grid, ax, ay, bx, by):
 
 @kernel
 def short_cost(surface, grid, ax, ay, bx, by):
-    """The cost of the straight way between two places, in pieces of at most a node."""
+    """The cost of the straight line between two places, in pieces of at most a node."""
     count = max(math.ceil(nodes_apart(grid, ax, ay, bx, by) - 1e-9), 1)
     return surface_ray(surface, ax, ay, bx, by, count)
 

@@ -28,7 +28,7 @@ class Ground(NamedTuple):
     dx: float  # distance of samples, map units
     dy: float
     pieces: int  # an edge between neighbouring nodes is cut into so many; a piece has 3 samples
-    reach: float  # a longer way is cut into pieces of at most this, in samples
+    reach: float  # a longer line is cut into pieces of at most this, in samples
     floor: float  # a lower bound on the costs
 
 
@@ -287,7 +287,7 @@ def gain_by_bending(ground, x0, y0, x2, y2):
 
 @inner_kernel
 def ray(ground, x, y, dx, dy):
-    """The cost of the way from (x, y) to (x, y) + d, in samples, nearly straight."""
+    """The cost of the nearly straight path from (x, y) to (x, y) + d, in samples."""
     count = 1
     while ground.reach * count < max(abs(dx), abs(dy)) - 1e-9:
         count *= 2
@@ -305,7 +305,7 @@ def ray(ground, x, y, dx, dy):
 
 @kernel
 def fill_rays(ground, x, y, places, costs):
-    """The cost of the nearly straight way from (x, y) to each of the places (m, 2), in samples."""
+    """The cost of the nearly straight path from (x, y) to each of the places (m, 2), in samples."""
     for m in range(places.shape[0]):
         dx, dy = places[m, 0] - x, places[m, 1] - y
         costs[m] = ray(ground, x, y, dx, dy) if dx != 0.0 or dy != 0.0 else 0.0
@@ -342,7 +342,7 @@ def surface_piece(surface, ax, ay, bx, by):
 
 @kernel
 def surface_ray(surface, ax, ay, bx, by, count):
-    """The cost of the straight way between two places, map units, in so many pieces."""
+    """The cost of the straight line between two places, map units, in so many pieces."""
     cost, vx, vy = 0.0, (bx - ax) / count, (by - ay) / count
     for k in range(count):
         x, y = ax + k * vx, ay + k * vy

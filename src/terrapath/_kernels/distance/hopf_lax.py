@@ -20,7 +20,7 @@ from ..space.free_space import segment_is_free
 from .calendar_queue import QUEUED, dequeue, enqueue, least
 from .ground import Costs, bent, costed, flat, place_at, plus_rise, ray, read
 from .segments import LEAST_T, NOWHERE, Place, Segment, place_of_least, value_on
-from .star import EAST, FARTHEST, HALF, NORTH, NUMBERS, beside, direction_between, entry_of
+from .star import EAST, HALF, NORTH, beside, direction_of, entry_of
 
 
 class Source(NamedTuple):
@@ -130,7 +130,7 @@ def is_clear(medium, n, ka, kb):
     """May a path to n begin anywhere between the ends of two directions?"""
     if not medium.has_obstacles:
         return True
-    a, between = n + medium.steps[ka], direction_between(ka, kb)
+    a, between = n + medium.steps[ka], direction_of(EAST[kb] - EAST[ka], NORTH[kb] - NORTH[ka])
     if between >= 0 and entry_of(medium.stars, a, between) >= 0:
         return True
     grid, b = medium.grid, n + medium.steps[kb]
@@ -150,10 +150,7 @@ def is_close(medium, node, di, dj):
 def is_joined(medium, a, n):
     """Does an edge lead from node a to node n?"""
     nx = medium.grid.nx
-    i, j = n % nx - a % nx, n // nx - a // nx
-    if max(abs(i), abs(j)) > FARTHEST:
-        return False
-    direction = NUMBERS[j + FARTHEST, i + FARTHEST]
+    direction = direction_of(n % nx - a % nx, n // nx - a // nx)
     return direction >= 0 and entry_of(medium.stars, a, direction) >= 0
 
 
@@ -193,7 +190,7 @@ def bend_of(medium, front, state, node, ka, kb):
 
 
 class Arrival(NamedTuple):
-    """A way to a node: what it costs, and the chord from the source to where it begins."""
+    """A path to a node: what it costs, and the chord from the source to where it begins."""
 
     cost: float
     chord: float
@@ -201,7 +198,7 @@ class Arrival(NamedTuple):
 
 @inner_kernel
 def along_ray(medium, source, node, x, y):
-    """The way from the place (x, y) from a node, in nodes, piece by piece."""
+    """The straight path to a node from the place (x, y) away, in nodes, piece by piece."""
     ground, per = medium.ground, 2.0 * medium.ground.pieces
     cost = ray(ground, per * node.i, per * node.j, per * x, per * y)
     dx, dy = node.x + x * medium.grid.dx, node.y + y * medium.grid.dy
@@ -213,15 +210,35 @@ def along_ray(medium, source, node, x, y):
     return Arrival(cost, math.sqrt(squared))
 
 
+class Crossing(NamedTuple):
+    """Samples on the line from t between two neighbours to a node."""
+
+    begin: float
+    middle: float
+    across: float  # the slope along the segment between the neighbours
+
+
+@inner_kernel
+def on_triangle(samples, i, j, ai, aj, bi, bj, t):
+    """The quadratic through the corners of a triangle and the middles of its sides.
+
+    (i, j) : the sample at the node. (ai, aj), (bi, bj) : half of the vectors to the neighbours.
+    """
+    za, zb = samples[j + 2 * aj, i + 2 * ai], samples[j + 2 * bj, i + 2 * bi]
+    ma, mb = samples[j + aj, i + ai], samples[j + bj, i + bi]
+    sag = samples[j + aj + bj, i + ai + bi] - 0.5 * (za + zb)
+    return Crossing(
+        za + t * (zb - za) + 4.0 * t * (1.0 - t) * sag,
+        ma + t * (mb - ma) + t * (1.0 - t) * sag,
+        2.0 * (mb - ma) + 2.0 * (1.0 - 2.0 * t) * sag,
+    )
+
+
 @inner_kernel
 def in_triangle(medium, source, node, ka, kb, t):
-    """The way from t between two neighbours, in one piece.
-
-    Heights are the quadratic through the corners of the triangle and the middles of its sides.
-    """
-    ground, grid, z = medium.ground, medium.grid, medium.heights
-    half, n = ground.pieces, node.n
-    a, b, i, j = n + medium.steps[ka], n + medium.steps[kb], 2 * half * node.i, 2 * half * node.j
+    """The path from t between two neighbours, in one piece."""
+    ground, grid, half = medium.ground, medium.grid, medium.ground.pieces
+    i, j = 2 * half * node.i, 2 * half * node.j
     ai, aj, bi, bj = half * EAST[ka], half * NORTH[ka], half * EAST[kb], half * NORTH[kb]
     x, y = EAST[ka] + t * (EAST[kb] - EAST[ka]), NORTH[ka] + t * (NORTH[kb] - NORTH[ka])
     vx, vy = x * grid.dx, y * grid.dy
@@ -230,25 +247,15 @@ def in_triangle(medium, source, node, ka, kb, t):
     sx, sy = node.x + vx, node.y + vy
     squared = sx * sx + sy * sy
     for layer in range(source.lift.shape[0]):
-        samples, za, zb = ground.heights[layer], z[a, layer], z[b, layer]
-        ma, mb = samples[j + aj, i + ai], samples[j + bj, i + bi]
-        sag = samples[j + aj + bj, i + ai + bi] - 0.5 * (za + zb)
-        middle = ma + t * (mb - ma) + t * (1.0 - t) * sag
-        begin = za + t * (zb - za) + 4.0 * t * (1.0 - t) * sag
-        across = 2.0 * (mb - ma) + 2.0 * (1.0 - 2.0 * t) * sag
-        lift = plus_rise(lift, z[n, layer], middle, begin, across)
-        rise = begin - source.lift[layer]
+        z = on_triangle(ground.heights[layer], i, j, ai, aj, bi, bj, t)
+        lift = plus_rise(lift, ground.heights[layer, j, i], z.middle, z.begin, z.across)
+        rise = z.begin - source.lift[layer]
         squared += rise * rise
     cost = bent(lift)
     if ground.costs.shape[0] > 0:
-        c = ground.costs[0]
-        ca, cb, cn = c[j + 2 * aj, i + 2 * ai], c[j + 2 * bj, i + 2 * bi], c[j, i]
-        ma, mb = c[j + aj, i + ai], c[j + bj, i + bi]
-        sag = c[j + aj + bj, i + ai + bi] - 0.5 * (ca + cb)
-        middle = max(ma + t * (mb - ma) + t * (1.0 - t) * sag, ground.floor)
-        begin = max(ca + t * (cb - ca) + 4.0 * t * (1.0 - t) * sag, ground.floor)
-        across = 2.0 * (mb - ma) + 2.0 * (1.0 - 2.0 * t) * sag
-        cost = costed(ground, lift, cost, Costs(cn, middle, begin, across))
+        c = on_triangle(ground.costs[0], i, j, ai, aj, bi, bj, t)
+        begin, middle = max(c.begin, ground.floor), max(c.middle, ground.floor)
+        cost = costed(ground, lift, cost, Costs(ground.costs[0, j, i], middle, begin, c.across))
     return Arrival(cost, math.sqrt(squared))
 
 

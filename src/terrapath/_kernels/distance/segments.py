@@ -19,7 +19,7 @@ class Segment(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The value that is offered from t of the way to the end of a direction."""
+    """The value offered from the share t of a segment, which ends where a direction leads."""
 
     value: float
     direction: np.int64

@@ -246,9 +246,8 @@ def beside(stars, n, e, side):
 
 
 @inner_kernel
-def direction_between(a, b):
-    """The number of the direction from the end of direction a to that of b, -1 where none is."""
-    x, y = EAST[b] - EAST[a], NORTH[b] - NORTH[a]
+def direction_of(x, y):
+    """The number of the direction along (x, y), in nodes; -1 where there is none."""
     if max(abs(x), abs(y)) > FARTHEST:
         return -1
     return NUMBERS[y + FARTHEST, x + FARTHEST]
