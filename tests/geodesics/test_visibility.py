@@ -12,6 +12,7 @@ from shapely import affinity
 import terrapath as tp
 from common import FLAT, REAL_MAPS, REGION, mostly_slow
 from layouts import LAYOUTS, star
+from mazes import maze
 from oracles import boxes_of_mask
 from processes import in_another_process
 from terrapath._kernels.geodesics import sight
@@ -113,23 +114,8 @@ def rooms(random):
     return blocked
 
 
-def maze(random):
-    """A tree of corridors of one cell."""
-    blocked = np.ones((13, 13), bool)
-    stack = [(1, 1)]
-    blocked[1, 1] = False
-    while stack:
-        j, i = stack[-1]
-        steps = [(a, b) for a, b in ((2, 0), (-2, 0), (0, 2), (0, -2))]
-        ahead = [(j + a, i + b) for a, b in steps if 0 < j + a < 12 and 0 < i + b < 12]
-        ahead = [(a, b) for a, b in ahead if blocked[a, b]]
-        if not ahead:
-            stack.pop()
-            continue
-        a, b = ahead[random.integers(len(ahead))]
-        blocked[(a + j) // 2, (b + i) // 2] = blocked[a, b] = False
-        stack.append((a, b))
-    return blocked
+def walled_maze(random):
+    return np.pad(maze(random, 11, 11), 1, constant_values=True)
 
 
 def streets(random):
@@ -142,7 +128,7 @@ def streets(random):
     return blocked
 
 
-GRIDS = (scattered, rooms, maze, streets)
+GRIDS = (scattered, rooms, walled_maze, streets)
 
 
 def free_places(random, blocked):

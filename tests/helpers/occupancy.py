@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 import terrapath as tp
+from mazes import maze
 
 KINDS = ("random", "rooms", "maze", "streets")
 
@@ -44,22 +45,7 @@ def _rooms(random, side):
 
 
 def _maze(random, side):
-    blocked = np.ones((side, side), bool)
-    seen, stack = {(0, 0)}, [(0, 0)]
-    blocked[0, 0] = False
-    while stack:
-        j, i = stack[-1]
-        steps = [(0, 2), (2, 0), (0, -2), (-2, 0)]
-        ends = [(j + dj, i + di) for dj, di in steps]
-        ends = [e for e in ends if e not in seen and 0 <= e[0] < side and 0 <= e[1] < side]
-        if not ends:
-            stack.pop()
-            continue
-        end = ends[random.integers(len(ends))]
-        blocked[end] = blocked[(j + end[0]) // 2, (i + end[1]) // 2] = False
-        seen.add(end)
-        stack.append(end)
-    return blocked
+    return maze(random, side, side)
 
 
 def _streets(random, side):

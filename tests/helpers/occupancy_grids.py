@@ -9,6 +9,7 @@ from scipy import ndimage
 
 import terrapath as tp
 from judges import boxes_of
+from mazes import maze
 
 
 @dataclass(frozen=True)
@@ -77,24 +78,8 @@ def _rooms(random, ny, nx):
 
 
 def _maze(random, ny, nx):
-    """A perfect maze with corridors and walls of one cell, and a few walls broken through."""
-    blocked = np.ones((ny, nx), bool)
-    blocked[0, 0], way = False, [(0, 0)]
-    while way:
-        j, i = way[-1]
-        steps = [(0, 2), (0, -2), (2, 0), (-2, 0)]
-        ahead = [
-            (b, a)
-            for b, a in steps
-            if 0 <= j + b < ny and 0 <= i + a < nx and blocked[j + b, i + a]
-        ]
-        if not ahead:
-            way.pop()
-            continue
-        b, a = ahead[random.integers(len(ahead))]
-        blocked[j + b // 2, i + a // 2] = blocked[j + b, i + a] = False
-        way.append((j + b, i + a))
-    return blocked & (random.random((ny, nx)) > random.choice([0.0, 0.05]))
+    """A maze with a few walls broken through."""
+    return maze(random, ny, nx) & (random.random((ny, nx)) > random.choice([0.0, 0.05]))
 
 
 def _streets(random, ny, nx):
