@@ -9,7 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.distance import calendar_queue, ground, hopf_lax, star
+from .._kernels.space.free_space import Grid
+from .._kernels.surface.cells import NO_CELLS, CostCells
 from .._kernels.surface.metric_rows import columns_of, fill_samples
+from .._kernels.surface.surfaces import Spline
 from .._support.watching import MustStop, WatchCount, never
 from ..errors import InputError
 from ..space.free_space import FreeSpace
@@ -181,10 +184,24 @@ def _sample(surface: Surface, lattice: Lattice) -> ground.Ground:
         ny=(lattice.ny - 1) * per + 1,
     )
     heights = np.empty((len(surface.data.weights), grid.ny, grid.nx))
-    costs = np.empty((1 if surface.costs else 0, grid.ny, grid.nx))
+    costs = np.empty((0 if surface.cost_data is None else 1, grid.ny, grid.nx))
     fill_samples(surface.data, grid, columns_of(surface.data, grid), heights, costs)
     reach = 2.0 * max(1.0, FEATURES_PER_PIECE / features) if features > 0.0 else math.inf
-    return ground.Ground(heights, costs, grid.dx, grid.dy, pieces, reach, surface.least_cost)
+    floor, cells = surface.least_cost, _cells_in_samples(surface, grid)
+    return ground.Ground(heights, costs, grid.dx, grid.dy, pieces, reach, floor, cells)
+
+
+def _cells_in_samples(surface: Surface, grid: Grid) -> CostCells:
+    """The costs that are constant in cells; places and sizes are in samples."""
+    if surface.cost_cells is None or not isinstance(surface.data, Spline):
+        return NO_CELLS
+    cells = surface.data.cells
+    return cells._replace(
+        x0=(cells.x0 - grid.x0) / grid.dx,
+        y0=(cells.y0 - grid.y0) / grid.dy,
+        dx=cells.dx / grid.dx,
+        dy=cells.dy / grid.dy,
+    )
 
 
 def _lay_stars(

@@ -16,7 +16,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
-from ..surface.surfaces import floor_of, log_cost_at, slope_at, spot_at, squared_cost_at
+from ..surface.cells import CostCells, any_cells, mean_in_cells
+from ..surface.surfaces import (
+    floor_of,
+    has_cells,
+    log_cost_at,
+    mean_cell_cost,
+    slope_at,
+    spot_at,
+    squared_cost_at,
+)
 from ..vec4 import sqrt
 
 
@@ -30,6 +39,7 @@ class Ground(NamedTuple):
     pieces: int  # an edge between neighbouring nodes is cut into so many; a piece has 3 samples
     reach: float  # a longer line is cut into pieces of at most this, in samples
     floor: float  # a lower bound on the costs
+    cells: CostCells  # costs that are constant in cells, in samples
 
 
 class Lift(NamedTuple):
@@ -119,8 +129,22 @@ def mean_cost(lift, c):
 
 @inner_kernel
 def costed(ground, lift, length, c):
-    """The cost of a piece of a length."""
-    return max(length * mean_cost(lift, c), ground.floor * sqrt(lift.vv))
+    """The cost of a piece of a length, by the smooth cost."""
+    return max(length * mean_cost(lift, c), smooth_floor(ground) * sqrt(lift.vv))
+
+
+@inner_kernel
+def smooth_floor(ground):
+    """A lower bound on the smooth cost."""
+    return ground.floor / ground.cells.least
+
+
+@inner_kernel
+def times_cells(ground, cost, x0, y0, x2, y2):
+    """The cost of a piece between two places, in samples, times that of the cells it meets."""
+    if not any_cells(ground.cells):
+        return cost
+    return cost * mean_in_cells(ground.cells, x0, y0, x2, y2)
 
 
 # Pieces between samples
@@ -150,10 +174,10 @@ def sampled_piece(ground, i, j, ex, ey):
         lift = plus_rise(lift, z[j, i], z[j1, i1], z[j2, i2], w)
     length = bent(lift)
     if ground.costs.shape[0] == 0:
-        return length
+        return times_cells(ground, length, i, j, i2, j2)
     c = ground.costs[0]
     costs = Costs(c[j, i], c[j1, i1], c[j2, i2], 0.5 * (c[jr, ir] - c[jl, il]))
-    return costed(ground, lift, length, costs)
+    return times_cells(ground, costed(ground, lift, length, costs), i, j, i2, j2)
 
 
 class Place(NamedTuple):
@@ -242,14 +266,15 @@ def piece(ground, x0, y0, x2, y2):
         lift = plus_rise(lift, read(z, layer, p0), read(z, layer, p1), read(z, layer, p2), across)
     length = bent(lift)
     if ground.costs.shape[0] == 0:
-        return length
+        return times_cells(ground, length, x0, y0, x2, y2)
+    floor = smooth_floor(ground)
     costs = Costs(
-        max(read(ground.costs, 0, p0), ground.floor),
-        max(read(ground.costs, 0, p1), ground.floor),
-        max(read(ground.costs, 0, p2), ground.floor),
+        max(read(ground.costs, 0, p0), floor),
+        max(read(ground.costs, 0, p1), floor),
+        max(read(ground.costs, 0, p2), floor),
         slope_along(ground.costs, 0, p1, -dy, dx),
     )
-    return costed(ground, lift, length, costs)
+    return times_cells(ground, costed(ground, lift, length, costs), x0, y0, x2, y2)
 
 
 @inner_kernel
@@ -337,7 +362,9 @@ def surface_piece(surface, ax, ay, bx, by):
         c * (vx * rise.fy - vy * rise.fx),
     )
     cost = bent(lift) * mean_cost(lift, costs)
-    return max(cost, floor_of(surface) * sqrt(lift.vv))
+    if not has_cells(surface):
+        return max(cost, floor_of(surface) * sqrt(lift.vv))
+    return max(cost * mean_cell_cost(surface, ax, ay, bx, by), floor_of(surface) * sqrt(lift.vv))
 
 
 @kernel

@@ -18,7 +18,18 @@ import numpy as np
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
 from .calendar_queue import QUEUED, dequeue, enqueue, least
-from .ground import Costs, bent, costed, flat, place_at, plus_rise, ray, read
+from .ground import (
+    Costs,
+    bent,
+    costed,
+    flat,
+    place_at,
+    plus_rise,
+    ray,
+    read,
+    smooth_floor,
+    times_cells,
+)
 from .segments import LEAST_T, NOWHERE, Place, Segment, place_of_least, value_on
 from .star import EAST, HALF, NORTH, beside, direction_of, entry_of
 
@@ -254,8 +265,10 @@ def in_triangle(medium, source, node, ka, kb, t):
     cost = bent(lift)
     if ground.costs.shape[0] > 0:
         c = on_triangle(ground.costs[0], i, j, ai, aj, bi, bj, t)
-        begin, middle = max(c.begin, ground.floor), max(c.middle, ground.floor)
+        floor = smooth_floor(ground)
+        begin, middle = max(c.begin, floor), max(c.middle, floor)
         cost = costed(ground, lift, cost, Costs(ground.costs[0, j, i], middle, begin, c.across))
+    cost = times_cells(ground, cost, i, j, i + 2 * half * x, j + 2 * half * y)
     return Arrival(cost, math.sqrt(squared))
 
 
