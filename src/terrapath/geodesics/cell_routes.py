@@ -87,7 +87,7 @@ def _is_flat(surface: Surface) -> bool:
     if not isinstance(data, Spline) or surface.cost_data is not None:
         return False
     reliefs = [float(np.ptp(layer)) for layer in data.coefficients]
-    return not (reliefs * data.weights).any()
+    return not (np.array(reliefs) * data.weights).any()
 
 
 def _parts(surface: Surface, side: float) -> int:
