@@ -253,6 +253,15 @@ class OutputSection:
             "--output",
         ),
     ] = ()
+    simplify: Annotated[
+        Extent,
+        Option(
+            "How far the route may be from the lines between the points written, map units; auto "
+            "is a tenth of a cell [default], none writes all points. .json has all points.",
+            'a finite number, "auto" or "none"',
+            form="LENGTH|auto|none",
+        ),
+    ] = "auto"
     plot: Annotated[
         str | None,
         a_file("Draw the route on the map: .png, .svg, .pdf or .jpg.", '"route.png"'),
