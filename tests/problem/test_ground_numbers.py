@@ -32,6 +32,8 @@ CASES = {
                             32632, (1, 1.0, 1.0)),
     "costs": ([HEIGHTS, COST], ["height", "mud"], ["m", ""], [1.0, 2.0], ["rise", "cost"], 32632,
               (0, 1.0, 1.0)),
+    "cost cells": ([HEIGHTS, COST], ["height", "mud"], ["m", ""], [2.0, 1.0], ["rise", "cells"],
+                   32632, (0, 1.0, 1.0)),
     "feet over feet": ([HEIGHTS], ["height"], ["ft"], [1.0], None, 2274,
                        (0, SURVEY_FOOT, SURVEY_FOOT)),
     "metres over feet": ([HEIGHTS], ["height"], ["m"], [1.0], None, 2274, (0, 1.0, SURVEY_FOOT)),

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._kernels.surface.cells import NO_CELLS
 from .._kernels.surface.surfaces import Peaks, Spline
 from .georeference import Georeference, metres_of
 from .layers import Layer
 from .surface import Surface
 
 HEIGHT = "height"
+NO_COSTS: dict[str, Any] = {"costs": (), "cost_data": None, "cost_cells": None}
 
 
 class Ground(NamedTuple):
@@ -78,7 +80,7 @@ def ground_of(surface: Surface) -> Ground:
     scale = 0.0 if k is None else height_scale(surface, surface.layers[k])
     layer = replace(surface.layers[k or 0], weight=scale)
     data = _alone(surface.data, k or 0, scale)
-    alone = replace(surface, data=data, layers=(layer,), costs=(), cost_data=None)
+    alone = replace(surface, data=data, layers=(layer,), **NO_COSTS)
     return Ground(alone, metres or 1.0, unit)
 
 
@@ -87,9 +89,12 @@ def _alone(data: Peaks | Spline, layer: int, weight: float) -> Peaks | Spline:
     weights = np.array([weight])
     if isinstance(data, Spline):
         coefficients = data.coefficients[layer : layer + 1]
-        no_costs = data.log_cost[:0]
         return data._replace(
-            coefficients=coefficients, weights=weights, log_cost=no_costs, floor=1.0
+            coefficients=coefficients,
+            weights=weights,
+            log_cost=data.log_cost[:0],
+            cells=NO_CELLS,
+            floor=1.0,
         )
     first, last = data.first[layer], data.first[layer + 1]
     return Peaks(data.peaks[first:last], np.array([0, last - first]), weights)
