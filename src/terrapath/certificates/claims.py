@@ -16,9 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.certificates import norms as kernels
-from .._kernels.surface.cells import range_in_box
-from .._kernels.surface.points import fill_values
-from .._kernels.surface.surfaces import Peaks, Spline
+from .._kernels.surface.surfaces import Peaks, Spline, fill_values
 from .._support.watching import MustStop, never
 from ..errors import CertificateError
 from ..problem import Problem
@@ -145,8 +143,7 @@ def _ground(problem: Problem) -> Ground:
     (x, y), data = problem.start, problem.surface.data
     moved: Peaks | Spline
     if isinstance(data, Spline):
-        cells = data.cells._replace(x0=data.cells.x0 - x, y0=data.cells.y0 - y)
-        moved = data._replace(x0=data.x0 - x, y0=data.y0 - y, cells=cells)
+        moved = data._replace(x0=data.x0 - x, y0=data.y0 - y)
     else:
         moved = data._replace(peaks=data.peaks - (0.0, 0.0, x, y))
     ends = np.array([problem.start, problem.goal]) - (x, y)
@@ -259,8 +256,7 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
 
     The ground is the core, widened by half its size on all sides. Let c be the cost at the end and
     G the steepest slope of the cost there. A path of length s, without costs, has met no cost below
-    c - G s. So at a distance of d it is at least (c - G d / 2) d long. Where costs are constant in
-    cells, all that is multiplied by the least of the cells around.
+    c - G s. So at a distance of d it is at least (c - G d / 2) d long.
     """
     surface, data = problem.surface, problem.surface.data
     if not (surface.costs and isinstance(data, Spline)):
@@ -277,12 +273,10 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
         (around.x2_max - y, around.x2_max < bounds.x2_max),
     )
     far = min((distance for distance, is_inside in sides if is_inside), default=math.inf)
-    found, cost = span_within(data, around), math.exp(float(surface.log_cost_jets((x, y))[0]))
+    found, cost = span_within(data, around), float(surface.cost((x, y)))
     farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
-    least = range_in_box(data.cells, x0 - width, x1 + width, y0 - height, y1 + height).low
-    least *= 1.0 - ROUNDING
-    floor = least * max(found.least, cost - 0.5 * found.steepest * farthest)
-    return kernels.Anchor(end.lifted, floor, least * found.least * float(far))
+    floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
+    return kernels.Anchor(end.lifted, floor, found.least * (1.0 - ROUNDING) * float(far))
 
 
 def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> float:

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from ..scenario.scenario import Given, assembled
+from ..scenario.loading import assembled
+from ..scenario.scenario import Given
 from .console import ExitCode, compiling_announced
 from .options import Where, with_options
 

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
+from ..scenario.loading import assembled
 from ..scenario.outputs import FieldOutputs
-from ..scenario.scenario import Given, assembled
+from ..scenario.scenario import Given
 from .console import ExitCode, compiling_announced
 from .options import Where, with_options
 

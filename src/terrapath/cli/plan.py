@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ..scenario.scenario import Given, assembled
+from ..scenario.loading import assembled
+from ..scenario.scenario import Given
 from .console import ExitCode, compiling_announced, progress_bar
 from .options import Where, with_options
 

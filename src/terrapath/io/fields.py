@@ -12,7 +12,6 @@ from .. import __version__
 from .._support.files import written_whole
 from ..distance.field import DistanceField
 from ..errors import MapError
-from ..surface.ground import quantity, value_unit
 from ..validation import Array
 
 
@@ -36,8 +35,7 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
     from rasterio.io import MemoryFile
 
     values, transform = _north_up(field)
-    reference, unit = field.surface.georeference, value_unit(field.surface)
-    name = quantity(field.surface)
+    reference, unit = field.surface.georeference, field.surface.unit
     profile: dict[str, object] = {
         "driver": "GTiff",
         "width": values.shape[1],
@@ -54,7 +52,7 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
     with MemoryFile() as memory:
         with memory.open(**profile) as dataset:
             dataset.write(values, 1)
-            dataset.set_band_description(1, f"{name} ({unit})" if unit else name)
+            dataset.set_band_description(1, f"distance ({unit})" if unit else "distance")
             dataset.units = (unit,)
             dataset.update_tags(**_tags(field))
         file.write_bytes(memory.read())
@@ -70,7 +68,7 @@ def _write_npz(field: DistanceField, file: Path) -> None:
             x=field.lattice.x,
             y=field.lattice.y,
             source=np.array(field.source),
-            unit=value_unit(field.surface),
+            unit=field.surface.unit,
             crs="" if reference is None else reference.crs.to_wkt(),
         )
 

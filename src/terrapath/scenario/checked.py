@@ -8,7 +8,8 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from .option import Declared, declared
-from .scenario import SECTIONS, LayerTable, Scenario, options
+from .scenario import SECTIONS, Scenario, options
+from .sections import LayerTable
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter

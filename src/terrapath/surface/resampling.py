@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._kernels.surface.points import fill_values
-from .._kernels.surface.surfaces import Spline
+from .._kernels.surface.surfaces import Spline, fill_values
 from .._support.memory import blocks
 from ..errors import MapError
 from ..validation import Array
