@@ -11,7 +11,7 @@ import shapely
 
 from terrapath import FastMarching, Lattice, Problem, RRTStar, Surface, refine
 from terrapath._kernels.surface.lengths import fill_chords, fill_line_r
-from terrapath._kernels.surface.surfaces import fill_jets, fill_metric, fill_values
+from terrapath._kernels.surface.points import fill_jets, fill_metric, fill_values
 from terrapath.certificates.search import Search
 from terrapath.distance.field import field_of, march_from
 from terrapath.distance.medium import Medium

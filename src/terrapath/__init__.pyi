@@ -11,6 +11,7 @@ from .errors import (
     InputError as InputError,
     KernelWarning as KernelWarning,
     MapError as MapError,
+    MapWarning as MapWarning,
     MissingExtraError as MissingExtraError,
     OutsideSurfaceError as OutsideSurfaceError,
     RepairedWarning as RepairedWarning,

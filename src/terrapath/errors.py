@@ -61,6 +61,10 @@ class KernelWarning(TerrapathWarning, RuntimeWarning):
     """Kernels are compiled more slowly or more often than they could be."""
 
 
+class MapWarning(TerrapathWarning):
+    """A map was not used exactly as it is: something was assumed, or taken as no data."""
+
+
 class VectorWarning(TerrapathWarning):
     """A vector file was not used exactly as it is: something was assumed, or left out."""
 

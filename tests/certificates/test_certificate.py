@@ -69,6 +69,8 @@ def test_the_checker_shares_nothing_with_the_solver():
     }
     assert imports_of(claims) == {
         "_kernels.certificates.norms",
+        "_kernels.surface.cells",
+        "_kernels.surface.points",
         "_kernels.surface.surfaces",
         "_support.watching",
         "errors",

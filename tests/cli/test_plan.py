@@ -69,7 +69,7 @@ def test_start_and_goal_can_be_given_and_equal_ends_give_a_path_of_length_zero(c
 def test_the_table_shows_what_was_asked_for(capsys):
     assert run(["plan", "three-peaks", *FAST]) == 0
     table = " ".join(capsys.readouterr().out.split())
-    words = "status", "true length", "straight-line length", "climb", "samples", "seconds"
+    words = "status", "value", "ground length", "straight-line length", "climb", "side slope"
     proven = "lower bound", "no path is shorter", "gap", "planner's path", "% longer"
     for word in (*words, *proven, "edges pruned"):
         assert word in table, word
@@ -111,15 +111,28 @@ def test_a_raster_with_layers_is_planned_and_written_in_every_format(dem, tmp_pa
     assert json.loads(outputs[2].read_text())["path"] == answer["path"]
     feature = json.loads(outputs[0].read_text())["features"][0]
     written = np.array(feature["geometry"]["coordinates"])  # to a tenth of a millimetre
-    for place in answer["path_lonlat"]:
+    for place in (answer["path_lonlat"][0], answer["path_lonlat"][-1]):
         assert np.abs(written - place).max(axis=1).min() < 1e-8
-    for key in ("length", "lower_bound", "gap", "unrefined_length"):
+    for key in (
+        "value",
+        "unit",
+        "ground_length",
+        "climb",
+        "steepest_side",
+        "length",
+        "lower_bound",
+        "gap",
+        "unrefined_length",
+    ):
         assert feature["properties"][key] == answer[key]
     header, *rows = outputs[1].read_text().splitlines()
     assert header == (
-        "distance,x,y,longitude,latitude,height [m],slope [degrees],ground slope [degrees],rocks"
+        "distance [m],value [weighted m],x,y,longitude,latitude,height [m],slope [degrees],"
+        "ground slope [degrees],side slope [degrees],rocks"
     )
-    assert float(rows[-1].split(",")[0]) == pytest.approx(answer["length"], rel=1e-9)
+    ends = [float(text) for text in rows[-1].split(",")[:2]]
+    assert ends == pytest.approx([answer["ground_length"], answer["value"]], rel=1e-9)
+    assert answer["unit"] == "weighted m"
     assert outputs[3].read_bytes().startswith(b"\x89PNG")
 
 
@@ -191,7 +204,7 @@ BAD_ARGUMENTS = {
     "malformed weight": (["six-peaks", "--weight", "height"], "NAME=WEIGHT"),
     "degrees in the wrong order": (["jacksboro", "--start", "36.5,-84.2"], "longitude -84.4"),
     "name too long": (["six-peaks", "--obstacles", 300 * "a"], "cannot be a file", "too long"),
-    "unknown format": (["six-peaks", "--output", "x.shp"], "x.shp", ".geojson"),
+    "unknown format": (["six-peaks", "--output", "x.dxf"], "x.dxf", ".geojson"),
     "unknown picture": (["six-peaks", "--plot", "x.bmp"], "x.bmp", ".png"),
     "no directory": (["six-peaks", "--output", "no/where.csv"], "no/where.csv", "directory"),
     "same file twice": (["six-peaks", "--output", "a.csv", "--output", "a.csv"], "twice"),

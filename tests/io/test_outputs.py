@@ -25,14 +25,17 @@ def test_geojson_is_read_by_shapely_as_the_same_line(solution, tmp_path):
     line = shapely.get_parts(shapely.from_geojson((tmp_path / "route.geojson").read_text()))[0]
     reference = solution.problem.surface.georeference
     back = reference.from_map(shapely.get_coordinates(line))
-    assert np.abs(back - solution.path.points).max() < 1e-3  # a millimetre
+    assert np.abs(back[[0, -1]] - solution.path.points[[0, -1]]).max() < 1e-3  # a millimetre
+    off = shapely.hausdorff_distance(shapely.LineString(back), solution.path.line, densify=0.01)
+    assert off < 0.1 * solution.problem.surface.resolution
 
 
 def test_geojson_without_crs_keeps_the_plane(tmp_path):
     solution = tp.RRTStar(samples=300).solve(tp.scenes.load("one-peak"))
     tp.write_route(solution, tmp_path / "route.geojson")
     feature = json.loads((tmp_path / "route.geojson").read_text())["features"][0]
-    assert feature["geometry"]["coordinates"] == solution.path.points.tolist()
+    line = shapely.LineString(feature["geometry"]["coordinates"])
+    assert shapely.hausdorff_distance(line, solution.path.line, densify=0.01) < 0.12
     assert "without CRS" in feature["properties"]["coordinates"]
 
 
@@ -52,7 +55,8 @@ def test_records_tell_the_bound_and_the_planners_own_length(finished, tmp_path):
         assert found["unrefined_length"] == finished.unrefined.length > finished.length
         assert found["lower_bound"] == finished.lower_bound
         assert found["gap"] == finished.gap
-    assert feature["geometry"]["coordinates"] == finished.path.points.tolist()
+    assert record["path"] == finished.path.points.tolist()
+    assert len(feature["geometry"]["coordinates"]) == feature["properties"]["points"]
 
 
 def test_what_was_not_asked_for_is_null_in_records(solution, tmp_path):
@@ -144,11 +148,11 @@ def test_a_failure_while_a_field_is_written_leaves_nothing(walled, tmp_path, mon
 
 
 def test_csv_is_the_profile(solution, tmp_path):
-    tp.write_route(solution, tmp_path / "route.csv")
+    tp.write_route(solution, tmp_path / "route.csv", simplify=0.0)
     with (tmp_path / "route.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     profile = solution.path.profile
-    assert [float(row["distance"]) for row in rows] == profile.distance.tolist()
+    assert [float(row["distance [m]"]) for row in rows] == profile.distance.tolist()
     assert [float(row["height [m]"]) for row in rows] == profile.values[:, 0].tolist()
 
 
@@ -156,7 +160,8 @@ def test_the_profile_adds_up(solution):
     profile = solution.path.profile
     assert profile.distance[-1] == pytest.approx(solution.length, rel=1e-9)
     rises = np.diff(profile.values[:, 0])
-    assert solution.path.climb == pytest.approx(rises[rises > 0].sum())
+    assert solution.path.climb == pytest.approx(rises[rises > 0].sum(), rel=1e-2)
+    assert solution.path.climb >= rises[rises > 0].sum()
     net = profile.values[-1, 0] - profile.values[0, 0]
     assert solution.path.climb >= max(net, 0.0)
 

@@ -14,12 +14,15 @@ import terrapath as tp
 from common import REAL_MAPS, one_line
 from oracles import is_blocked
 from rasters import HEIGHTS, NORTH_UP, UTM, centres, write
-from terrapath.io.maps import LayerSource
+from terrapath.io.sources import LayerSource
 from terrapath.surface.georeference import Georeference
 from terrapath.surface.raster import Raster
 
 # rasterio 1.4 multiplies Affine by "*" in its own modules, which affine 3 is about to retire.
 pytestmark = pytest.mark.filterwarnings("ignore:Use `@` matmul:PendingDeprecationWarning")
+
+# What is told of such maps has tests of its own.
+TOLD = pytest.mark.filterwarnings("ignore::terrapath.MapWarning")
 
 # Values
 
@@ -73,7 +76,7 @@ def test_scale_and_offset_of_a_band_are_applied(tmp_path):
         ("float64", None, np.inf),
         ("float32", -9999.0, -9999.0),
         ("int16", -32768, -32768),
-        ("uint8", 255, 255),
+        pytest.param("uint8", 255, 255, marks=TOLD),
     ],
 )
 def test_no_data_becomes_blocked_cells_and_nothing_else_does(tmp_path, dtype, declared, stored):
@@ -376,7 +379,8 @@ def test_a_projected_map_is_planned_in_its_own_crs(tmp_path):
 def test_heights_without_a_unit_are_metres_only_on_a_plane_in_metres(tmp_path):
     transform = Affine(10.0, 0.0, 6.5e6, 0.0, -10.0, 2e6)
     feet = write(tmp_path / "feet.tif", HEIGHTS, transform, "EPSG:2225")
-    surface = tp.read_surface(feet)
+    with pytest.warns(tp.MapWarning, match="without a unit, and are taken to be in ft"):
+        surface = tp.read_surface(feet)
     assert surface.unit == "ft"
     assert surface.layers[0].unit == "ft"
 

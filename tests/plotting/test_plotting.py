@@ -83,8 +83,9 @@ def test_the_title_tells_the_bound_and_that_a_path_is_refined(solution, problem)
     refined = tp.Path(problem.surface, solution.path.points[::2])
     proven = replace(solution, path=refined, unrefined=solution.path, lower_bound=16.9)
     title = draw_route(proven).get_suptitle()
-    assert "rrt-star-r, refined, length" in title
-    assert f"no path is shorter than 16.9000, a gap of {100 * proven.gap:.3g} %" in title
+    assert f"rrt-star-r, refined, {proven.path.ground_length:.4f} on the ground, value" in title
+    assert "no path costs less than 16.9000 weighted units" in title
+    assert f"a gap of {100 * proven.gap:.3g} %" in title
 
 
 def test_heights_and_contours_of_a_further_layer_are_named():
@@ -104,7 +105,7 @@ def test_other_routes_are_drawn_thinner_and_dashed_with_their_lengths(problem):
     axes = draw_route(solution).axes[0]
     lines = {line.get_label(): line for line in axes.lines}
     for path in paths[1:]:
-        line = lines[f"next best, {path.length:.4f}"]
+        line = lines[f"next best, {path.length:.4f} weighted units"]
         np.testing.assert_array_equal(line.get_xydata(), path.points)
         assert line.get_linewidth() < lines["route"].get_linewidth()
         assert line.is_dashed()
@@ -239,7 +240,7 @@ def test_the_profile_chart_shows_height_slope_and_each_further_layer(solution, t
     assert np.median(np.abs(0.5 * (along[1:] + along[:-1]) - measured)) < 0.2
     assert slope.get_ylabel() == "slope (degrees)"
     assert height.get_ylabel() == "height"
-    assert resistance.get_xlabel() == "distance along the surface"
+    assert resistance.get_xlabel() == "distance on the ground"
     assert f"{solution.length:.4f}" in figure.get_suptitle()
     for ending in (".png", ".svg", ".pdf"):
         plot_profile(solution, tmp_path / f"profile{ending}")
@@ -257,7 +258,7 @@ def test_the_limit_of_the_slope_is_drawn_where_there_is_one(solution):
 
 def test_long_profiles_in_metres_are_labelled_in_kilometres():
     figure = draw_profile(tp.RRT(samples=2000).solve(tp.scenes.load("jacksboro")))
-    assert figure.axes[-1].get_xlabel() == "distance along the surface (km)"
+    assert figure.axes[-1].get_xlabel() == "distance on the ground (km)"
     assert figure.axes[0].get_ylabel() == "height (m)"
 
 
@@ -344,7 +345,7 @@ def test_far_from_zero_a_page_counts_from_a_nearer_corner():
     figure = draw_page(solution)
     route = next(trace for trace in figure.data if trace.name == "route")
     np.testing.assert_array_equal(route.x + 4_100_000, path.profile.points[:, 0])
-    np.testing.assert_array_equal(route.customdata[:, 4:], path.profile.points)
+    np.testing.assert_array_equal(route.customdata[:, 4:6], path.profile.points)
     assert figure.layout.scene.xaxis.title.text == "x1 - 4100000"
 
 
@@ -360,7 +361,7 @@ def test_names_from_files_are_no_markup(solution, tmp_path):
 def test_next_best_routes_and_a_search_without_a_path_have_their_pages(solution, tmp_path):
     bow = solution.problem.path([(0, 0), (3, 7), (10, 10)])
     plot_page(replace(solution, alternatives=(bow,)), tmp_path / "page.html")
-    drawn = traces_of(tmp_path / "page.html")[f"next best, {bow.length:.4f}"]
+    drawn = traces_of(tmp_path / "page.html")[f"next best, {bow.length:.4f} weighted units"]
     assert decoded(drawn["x"]).tolist() == bow.profile.points[:, 0].tolist()
     nothing = tp.RRTStar(samples=5, step=0.1, informed=False).solve(solution.problem)
     assert "found no path" in draw_page(nothing).layout.title.text

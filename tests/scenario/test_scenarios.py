@@ -22,8 +22,7 @@ from terrapath.errors import InputError
 from terrapath.io.vectors.layers import read_layers
 from terrapath.planners import tours
 from terrapath.scenario import Scenario, scenario_schema
-from terrapath.scenario.scenario import options
-from terrapath.scenario.sections import LayerTable
+from terrapath.scenario.scenario import LayerTable, options
 from terrapath.scenario.toml import read_scenario
 
 QUICK = ["--samples", "400", "--no-bound"]

@@ -15,6 +15,10 @@ from ..errors import MapError
 # A ROS 2 bag is the one output that is a folder; every bag contains this file.
 BAG_ENDING, BAG_MARK = ".bag2", "metadata.yaml"
 
+# The files that belong to a shapefile: those that are written, and those that would be out of date.
+SHAPEFILE_ENDING, SHAPEFILE_PARTS = ".shp", (".shx", ".dbf", ".prj", ".cpg")
+SHAPEFILE_INDICES = (".qix", ".sbn", ".sbx", ".idm", ".ind", ".qpj", ".shp.xml")
+
 # The start of temporary names. Short, because a path may be almost as long as is allowed.
 TEMPORARY = ".terrapath-"
 
@@ -29,13 +33,24 @@ def _require_bag(path: Path) -> None:
         raise FileExistsError(f"{path} is a folder that holds other things than a ROS 2 bag")
 
 
+def _require_shapefile(path: Path) -> None:
+    """Raise OSError where a part of a new shapefile would replace what belongs to another file."""
+    if path.exists():
+        return
+    for part in parts_of(path):
+        if part.exists():
+            raise FileExistsError(f"it would replace {part}, which belongs to another file")
+
+
 def require_writable(path: Path) -> None:
     """Raise MapError where a file cannot be written; the check leaves no file behind."""
     try:
         _require_name(path)
         if path.suffix.lower() == BAG_ENDING:
             _require_bag(path)
-        elif path.is_dir():
+        elif path.suffix.lower() == SHAPEFILE_ENDING:
+            _require_shapefile(path)
+        if path.suffix.lower() != BAG_ENDING and path.is_dir():
             raise IsADirectoryError(f"{path} is a directory")
         if path.exists() and not os.access(path, os.W_OK):
             raise PermissionError(f"{path} is write-protected")
@@ -47,6 +62,13 @@ def require_writable(path: Path) -> None:
             f"output={str(path)!r} cannot be written: {reason}; "
             "name a file in a directory that exists and that you may write to"
         ) from None
+
+
+def parts_of(path: Path) -> list[Path]:
+    """All files that an output is made of: the one that is named, and those beside it."""
+    if path.suffix.lower() != SHAPEFILE_ENDING:
+        return [path]
+    return [path, *(path.with_suffix(ending) for ending in SHAPEFILE_PARTS)]
 
 
 def _require_name(path: Path) -> None:
@@ -93,6 +115,24 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
                 if old.exists():
                     old.rename(path)
                 raise
+    except OSError as error:
+        raise _unwritten(path, error) from None
+
+
+@contextmanager
+def shapefile_written_whole(path: Path) -> Iterator[Path]:
+    """Give a path for a new shapefile, whose parts replace those of ``path`` without an error."""
+    try:
+        _require_shapefile(path)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=TEMPORARY) as aside:
+            made = Path(aside, f"route{SHAPEFILE_ENDING}")
+            yield made
+            for ending in SHAPEFILE_PARTS:
+                part, old = made.with_suffix(ending), path.with_suffix(ending)
+                part.replace(old) if part.exists() else old.unlink(missing_ok=True)
+            for ending in SHAPEFILE_INDICES:
+                path.with_suffix(ending).unlink(missing_ok=True)
+            made.replace(path)
     except OSError as error:
         raise _unwritten(path, error) from None
 

@@ -123,7 +123,10 @@ def fingerprint(problem: Problem) -> str:
     """A hash of all that a lower bound depends on."""
     data = problem.surface.data
     ends = (problem.bounds, problem.start, problem.goal)
-    return _hash(type(data).__name__, *data, *ends, *problem.free_space.data)
+    parts = data._asdict()
+    cells = parts.pop("cells", ()) if problem.surface.cost_cells is not None else ()
+    parts.pop("cells", None)
+    return _hash(type(data).__name__, *parts.values(), *cells, *ends, *problem.free_space.data)
 
 
 def seal_of(certificate: Certificate) -> str:

@@ -16,7 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.certificates import norms as kernels
-from .._kernels.surface.surfaces import Peaks, Spline, fill_values
+from .._kernels.surface.cells import range_in_box
+from .._kernels.surface.points import fill_values
+from .._kernels.surface.surfaces import Peaks, Spline
 from .._support.watching import MustStop, never
 from ..errors import CertificateError
 from ..problem import Problem
@@ -143,7 +145,8 @@ def _ground(problem: Problem) -> Ground:
     (x, y), data = problem.start, problem.surface.data
     moved: Peaks | Spline
     if isinstance(data, Spline):
-        moved = data._replace(x0=data.x0 - x, y0=data.y0 - y)
+        cells = data.cells._replace(x0=data.cells.x0 - x, y0=data.cells.y0 - y)
+        moved = data._replace(x0=data.x0 - x, y0=data.y0 - y, cells=cells)
     else:
         moved = data._replace(peaks=data.peaks - (0.0, 0.0, x, y))
     ends = np.array([problem.start, problem.goal]) - (x, y)
@@ -256,7 +259,8 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
 
     The ground is the core, widened by half its size on all sides. Let c be the cost at the end and
     G the steepest slope of the cost there. A path of length s, without costs, has met no cost below
-    c - G s. So at a distance of d it is at least (c - G d / 2) d long.
+    c - G s. So at a distance of d it is at least (c - G d / 2) d long. Where costs are constant in
+    cells, all that is multiplied by the least of the cells around.
     """
     surface, data = problem.surface, problem.surface.data
     if not (surface.costs and isinstance(data, Spline)):
@@ -273,10 +277,12 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
         (around.x2_max - y, around.x2_max < bounds.x2_max),
     )
     far = min((distance for distance, is_inside in sides if is_inside), default=math.inf)
-    found, cost = span_within(data, around), float(surface.cost((x, y)))
+    found, cost = span_within(data, around), math.exp(float(surface.log_cost_jets((x, y))[0]))
     farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
-    floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
-    return kernels.Anchor(end.lifted, floor, found.least * (1.0 - ROUNDING) * float(far))
+    least = range_in_box(data.cells, x0 - width, x1 + width, y0 - height, y1 + height).low
+    least *= 1.0 - ROUNDING
+    floor = least * max(found.least, cost - 0.5 * found.steepest * farthest)
+    return kernels.Anchor(end.lifted, floor, least * found.least * float(far))
 
 
 def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> float:

@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from ..scenario.loading import assembled
 from ..scenario.outputs import FieldOutputs
-from ..scenario.scenario import Given
+from ..scenario.scenario import Given, assembled
 from .console import ExitCode, compiling_announced
 from .options import Where, with_options
 

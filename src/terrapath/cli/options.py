@@ -10,8 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..scenario.option import Declared, Extent, Files, Point, Points, Rectangle
-from ..scenario.scenario import Given, options
-from ..scenario.sections import LayerTable, LayerTables, Weights
+from ..scenario.scenario import Given, LayerTable, LayerTables, Weights, options
 
 Where = Annotated[
     str,
@@ -39,6 +38,12 @@ def parse_point(text: str, name: str) -> Point:
     """A point that is given as X,Y."""
     x, y = _numbers(text, name, "X,Y", "a point")
     return x, y
+
+
+def _parse_pair(text: str, name: str, form: str) -> tuple[float, float]:
+    """A point, or another two numbers."""
+    first, second = _numbers(text, name, form, "a point" if form == "X,Y" else "two numbers")
+    return first, second
 
 
 def _parse_pairs(texts: Iterable[str], option: str, form: str) -> dict[str, str]:
@@ -83,9 +88,7 @@ def _parse_extent(text: str, option: str) -> Extent:
     try:
         return float(text)
     except ValueError:
-        raise InputError(
-            f"{option} {text!r} is not a length; give one in map units, auto or none"
-        ) from None
+        raise InputError(f"{option} {text!r} is not a number; give one, auto or none") from None
 
 
 def _is_flag(declaration: Declared) -> bool:
@@ -108,7 +111,7 @@ def _value(declaration: Declared, given: object) -> object:
     kind, flag, form = declaration.type, declaration.flags[0], declaration.option.form or ""
     name = declaration.key
     readers: list[tuple[object, Callable[[Any], object]]] = [
-        (Point | None, lambda text: parse_point(text, name)),
+        (Point | None, lambda text: _parse_pair(text, name, form)),
         (Points, lambda texts: tuple(parse_point(text, name) for text in texts)),
         (Point | Points, lambda texts: tuple(parse_point(text, name) for text in texts)),
         (Rectangle | None, lambda text: _numbers(text, name, form, "a rectangle")),

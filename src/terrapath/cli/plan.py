@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ..scenario.loading import assembled
-from ..scenario.scenario import Given
+from ..scenario.scenario import Given, assembled
 from .console import ExitCode, compiling_announced, progress_bar
 from .options import Where, with_options
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,10 @@ import numpy as np
 
 from .._support.memory import peak_memory
 from ..problem import Path, Problem, Solution, Status
+from ..problem.solution import LARGE_GAP
 from ..scenario.answers import goal_status
 from ..surface import Layer, Surface
+from ..surface.ground import is_weighted, value_unit
 from .console import percent, remark
 
 if TYPE_CHECKING:
@@ -21,9 +24,6 @@ if TYPE_CHECKING:
 # At most this many of a planner's alternative routes are shown.
 MOST_ALTERNATIVES = 5
 
-# A gap above this share says that the route may be far from the shortest.
-LARGE_GAP = 0.05
-
 
 def _amount(value: float, unit: str) -> str:
     """A number with its unit: three digits after the point from 1,000 on, six below."""
@@ -31,14 +31,21 @@ def _amount(value: float, unit: str) -> str:
     return f"{value:{digits}} {unit}".rstrip()
 
 
-def _gap(gap: float, target: float | None, planner: str) -> str:
+def _gap(solution: Solution, target: float | None) -> str:
     """The gap, whether it meets the target where there is one, and what may help if it is large."""
-    if target is None and gap > LARGE_GAP and planner != "optimal":
-        return f"{percent(gap)}; --planner optimal may find a shorter route, or a better bound"
-    if target is None:
-        return percent(gap)
-    met = "is met" if gap <= target else "is not met"
-    return f"{percent(gap)}; the target of {percent(target)} {met}"
+    gap, text = solution.gap, solution.gap_in_words
+    assert gap is not None
+    if target is not None:
+        met = "is met" if gap <= target else "is not met"
+        return f"{text}; the target of {percent(target)} {met}"
+    if gap > LARGE_GAP and solution.planner != "optimal":
+        return f"{text}; --planner optimal may find a better route, or a better bound"
+    return text
+
+
+def _grade(slope: float) -> str:
+    """A slope as rise over run, and as an angle."""
+    return f"{percent(slope)} ({math.degrees(math.atan(slope)):.3g} degrees)"
 
 
 def _longer(length: float, than: float, unit: str) -> str:
@@ -63,24 +70,33 @@ def _counter_line(solution: Solution) -> str:
 
 def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, str]]:
     """The path's length, its lower bound and gap, and lengths to compare it with."""
-    problem, path, length = solution.problem, solution.path, solution.length
+    path, length = solution.path, solution.length
     if path is None or length is None:
         return
-    unit = problem.surface.unit
-    yield "true length", _amount(length, unit)
-    if solution.lower_bound is not None and solution.gap is not None:
+    unit = solution.unit
+    yield "value", f"{_amount(length, unit)}; what was minimised"
+    if solution.lower_bound is not None:
         yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bound_in_words}"
-        yield "gap", _gap(solution.gap, target_gap, solution.planner)
+        yield "gap", _gap(solution, target_gap)
+    yield from _on_the_ground(path)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
     assert solution.cost is not None
     yield "planner's cost", _amount(solution.cost, unit)
     yield "straight-line length", _amount(solution.straight_length, unit)
-    yield "climb", _amount(path.climb, problem.surface.layers[0].unit)
     yield from _contributions(path)
     if solution.alternatives:
         others = solution.alternatives[:MOST_ALTERNATIVES]
         yield "next best", ", ".join(_longer(other.length, length, unit) for other in others)
+
+
+def _on_the_ground(path: Path) -> Iterator[tuple[str, str]]:
+    """What people ask of a route, whatever was minimised."""
+    unit = path.ground_unit
+    yield "ground length", _amount(path.ground_length, unit)
+    yield "climb, descent", f"{_amount(path.climb, unit)}, {_amount(path.descent, unit)}"
+    yield "steepest grade", f"{_grade(path.steepest)} along the route"
+    yield "side slope", f"{_grade(path.steepest_side)} at most, across the route"
 
 
 def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, str]]:
@@ -117,7 +133,7 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     if corridor is None:
         return
     around = _amount(corridor.half_width, unit)
-    coarse = _amount(corridor.coarse_length, unit)
+    coarse = _amount(corridor.coarse_length, solution.unit)
     yield (
         "corridor",
         f"{around} on both sides of a route of {coarse}, planned on the map read "
@@ -127,7 +143,9 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     if least is None:
         yield "elsewhere", "nothing is proven: a path there may cost less"
     else:
-        yield "elsewhere", f"no path on the map is shorter than {_amount(least, unit)}, by chords"
+        chords = _amount(least, solution.unit)
+        verb = "costs less" if is_weighted(solution.problem.surface) else "is shorter"
+        yield "elsewhere", f"no path on the map {verb} than {chords}, by chords"
 
 
 def _each(surface: Surface, values: Iterable[float]) -> str:
@@ -167,9 +185,9 @@ def _exponent(layer: Layer) -> str:
 
 
 def _contributions(path: Path) -> Iterator[tuple[str, str]]:
-    """The share of the length that each layer causes."""
+    """The share of the value that each layer causes."""
     parts = (f"{percent(share)} {name}" for name, share in path.contributions.items())
-    yield "length made of", ", ".join(parts)
+    yield "value made of", ", ".join(parts)
 
 
 def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
@@ -222,33 +240,42 @@ def _optional(value: float | None, unit: str) -> str:
 
 
 def _print_legs(solution: Solution) -> None:
-    unit = solution.problem.surface.unit
+    unit = solution.unit
     rows = [
         (
             str(k),
             _place(leg.problem.goal),
             leg.status.value,
-            _optional(leg.length, unit),
+            _optional(leg.value, unit),
+            _ground_length(leg),
             _optional(leg.lower_bound, unit),
             "-" if leg.gap is None else percent(leg.gap),
         )
         for k, leg in enumerate(solution.legs, start=1)
     ]
-    _print_parts("Legs", ("leg", "to", "status", "length", "lower bound", "gap"), rows)
+    header = ("leg", "to", "status", "value", "ground length", "lower bound", "gap")
+    _print_parts("Legs", header, rows)
 
 
-def _print_goals(goals: Iterable[GoalAnswer], surface: Surface) -> None:
+def _ground_length(solution: Solution | None) -> str:
+    if solution is None or solution.path is None:
+        return "-"
+    return _amount(solution.path.ground_length, solution.path.ground_unit)
+
+
+def _print_goals(goals: Iterable[GoalAnswer], unit: str) -> None:
     rows = [
         (
             str(k),
             _place(answer.goal),
             goal_status(answer),
-            _optional(None if answer.solution is None else answer.solution.length, surface.unit),
-            _optional(answer.least, surface.unit),
+            _optional(None if answer.solution is None else answer.solution.value, unit),
+            _ground_length(answer.solution),
+            _optional(answer.least, unit),
         )
         for k, answer in enumerate(goals, start=1)
     ]
-    _print_parts("Goals", ("goal", "to", "status", "length", "lower bound"), rows)
+    _print_parts("Goals", ("goal", "to", "status", "value", "ground length", "lower bound"), rows)
 
 
 def _place(point: tuple[float, float]) -> str:
@@ -266,20 +293,21 @@ def print_report(
     if solution.legs:
         _print_legs(solution)
     if answers := list(goals):
-        _print_goals(answers, solution.problem.surface)
+        _print_goals(answers, solution.unit)
     if solution.status is not Status.SOLVED:
         remark(f"{solution.status.message} (stopped by: {solution.stopped_by})")
 
 
 def print_check(problem: Problem, certificate: Certificate, seconds: float) -> None:
     """What was proven of a certificate that holds."""
-    unit, lattice = problem.surface.unit, certificate.lattice
+    unit, lattice = value_unit(problem.surface), certificate.lattice
+    claim = "no path costs less" if is_weighted(problem.surface) else "no path is shorter"
     _print_table(
         [
             ("certificate", "holds"),
             ("start", _point(problem, problem.start)),
             ("goal", _point(problem, problem.goal)),
-            ("lower bound", _amount(certificate.value, unit) + "; no path is shorter"),
+            ("lower bound", f"{_amount(certificate.value, unit)}; {claim}"),
             ("dual norm", f"at most {certificate.norm:.9g}"),
             ("cells", f"{lattice.nx - 1:,} x {lattice.ny - 1:,}"),
             ("seconds", f"{seconds:.3f}"),
@@ -298,7 +326,7 @@ def print_field(field: DistanceField, seconds: float) -> None:
             ("start", _point(problem, problem.start)),
             ("nodes", f"{lattice.nx:,} x {lattice.ny:,}, {percent(field.reached)} reached"),
             ("spacing", _amount(max(lattice.dx, lattice.dy), unit)),
-            ("farthest", _amount(float(reached.max(initial=0.0)), unit)),
+            ("farthest", _amount(float(reached.max(initial=0.0)), value_unit(problem.surface))),
             ("seconds", f"{seconds:.3f}"),
         ]
     )

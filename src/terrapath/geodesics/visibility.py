@@ -15,6 +15,7 @@ import shapely
 
 from .._kernels.geodesics import sight, visibility as kernels
 from .._kernels.space.free_space import list_edges
+from .._kernels.surface.cells import range_in_box
 from .._kernels.surface.surfaces import Peaks, Spline
 from .._support.watching import WatchCount
 from ..errors import InputError
@@ -104,6 +105,9 @@ def _spline_is_flat(data: Spline, bounds: Bounds) -> bool:
     along_x = np.ptp(np.diff(layers, axis=2), axis=(1, 2)) / data.dx
     along_y = np.ptp(np.diff(layers, axis=1), axis=(1, 2)) / data.dy
     change = math.hypot(*(data.weights * along_x), *(data.weights * along_y))
+    costs = range_in_box(data.cells, bounds.x1_min, bounds.x1_max, bounds.x2_min, bounds.x2_max)
+    if costs.low < costs.high:
+        return False
     return change <= FLATNESS and (logs.size == 0 or float(np.ptp(logs)) <= FLATNESS)
 
 

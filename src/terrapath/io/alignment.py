@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -36,15 +36,23 @@ def _has_cells_of(grid: Grid, other: Grid) -> bool:
     return grid.is_same(other) or grid.flipped().is_same(other)
 
 
-def read_all(parts: Sequence[Part], base: View, target: Grid, most_cells: int) -> Array:
+def read_all(
+    parts: Sequence[Part],
+    base: View,
+    target: Grid,
+    most_cells: int,
+    without_fills: Callable[[View], View],
+) -> Array:
     """All layers (layers, rows, columns) on the cells of the target.
 
     The first layer is the heights; ``base`` is the part of them that is read. most_cells : a layer
-    that needs more cells is refused before memory is allocated.
+    that needs more cells is refused before memory is allocated. without_fills : a view with what
+    is no data without being declared as such.
     """
     views = [base, *(_view_onto(part, base, target) for part in parts[1:])]
     for view in views:
         view.require_size(most_cells)
+    views[1:] = map(without_fills, views[1:])
     bands = np.empty((len(parts), target.rows, target.columns))
     for part, view, out in zip(parts, views, bands, strict=True):
         if part.kind == "cost":

@@ -15,6 +15,7 @@ from ..errors import InputError, MapError
 from ..surface.georeference import parse_crs
 from ..surface.raster import Grid
 from ..validation import Array, as_array
+from .axes import in_unit_of_axes, is_degrees
 from .bands import Band
 from .rasters import HEIGHT_NAMES, reading, with_crs
 
@@ -32,6 +33,17 @@ class ArrayBand(Band):
     no_data: tuple[float, ...] = ()
     scale: float = 1.0
     offset: float = 0.0
+    rows_in_chunk: int = 1
+
+    @property
+    def rows_at_once(self) -> int:
+        """How many rows the file stores together in one block."""
+        return self.rows_in_chunk
+
+    @property
+    def scaling(self) -> tuple[float, float]:
+        """The scale and the offset of its stored numbers."""
+        return self.scale, self.offset
 
     def read(self, rows: slice, columns: slice) -> Array:
         """Values (rows, columns) with scale and offset applied, NaN where there is no data."""
@@ -64,26 +76,41 @@ def band_of_numpy(source: tuple[Any, Any, Any], which: int | str, crs: CRS | Non
     return _on_axes(array, x, y, crs, label="the array", unit="")
 
 
-def band_of_xarray(source: Any, which: int | str, crs: CRS | None, *, label: str = "") -> ArrayBand:
+def band_of_xarray(
+    source: Any,
+    which: int | str,
+    crs: CRS | None,
+    *,
+    label: str = "",
+    variable: str | None = None,
+) -> ArrayBand:
     """The band of a DataArray, or of a variable of a Dataset.
 
     which : the number of the band, from 1, or the name of the variable. label : its name in
-    messages; by default the array's name.
+    messages; by default the array's name. variable : its name, where ``which`` is a number of it.
     """
-    array, which = _variable(source, which) if hasattr(source, "data_vars") else (source, which)
+    array = source
+    if hasattr(source, "data_vars"):
+        array, first = _variable(source, variable or which)
+        which = which if isinstance(which, int) else first
     if not label:
         label = f"the array {array.name!r}" if array.name is not None else "the array"
     _require_numbers(array.dtype, label)
-    x, y = (_dimension(array, axis, label) for axis in ("x", "y"))
+    x, y = plane_dimensions(array, label)
+    chunks = dict(zip(array.dims, array.encoding.get("chunksizes") or (), strict=False))
     array = _plane(array, x, y, which, label).transpose(y, x)
     crs = with_crs(_crs(source, array, x, y), crs, label)
     attributes = array.attrs
     described: dict[str, Any] = {"label": label, "unit": str(attributes.get("units", ""))}
+    units = [_unit_of_axis(array, axis) for axis in (x, y)]
+    crs = in_unit_of_axes(crs, units, label)
+    described["unit_of_axes"] = "" if is_degrees(units[0]) else units[0]
     described["no_data"] = tuple(
         float(value)
         for key in ("_FillValue", "missing_value", "nodata", "nodatavals")
         for value in np.ravel(attributes.get(key, ()))
     )
+    described["rows_in_chunk"] = int(chunks.get(y) or 1)
     described["scale"] = float(attributes.get("scale_factor", 1.0))
     described["offset"] = float(attributes.get("add_offset", 0.0))
     if x not in array.coords or y not in array.coords:
@@ -93,6 +120,12 @@ def band_of_xarray(source: Any, which: int | str, crs: CRS | None, *, label: str
         as_array(array[axis].values, f"{axis} of {label}", shape=(None,)) for axis in (x, y)
     )
     return _on_axes(array, x_axis, y_axis, crs, **described)
+
+
+def _unit_of_axis(array: Any, axis: Hashable) -> str:
+    """The unit of the coordinates along a dimension; "" where it is not said."""
+    attributes = array[axis].attrs if axis in array.coords else {}
+    return str(attributes.get("units", "")).strip()
 
 
 def _require_band(which: int | str, count: int, label: str) -> None:
@@ -129,7 +162,14 @@ def _steps(axis: Array, name: str) -> tuple[float, float]:
     first, step = float(axis[0]), float((axis[-1] - axis[0]) / (len(axis) - 1))
     off = np.abs(axis - np.linspace(axis[0], axis[-1], len(axis))).max()
     if step == 0.0 or off > UNEQUAL * abs(step):
-        raise MapError(f"{name} is not in equal steps; resample it to equal steps first")
+        rounded = off <= 2.0 * float(np.spacing(np.float32(np.abs(axis).max())))
+        remedy = (
+            "its values are rounded to 32-bit numbers; give them in 64 bits, or as differences "
+            "from a round number"
+            if rounded
+            else "resample it to equal steps first"
+        )
+        raise MapError(f"{name} is not in equal steps; {remedy}")
     return first, step
 
 
@@ -154,6 +194,11 @@ def _variable(dataset: Any, which: int | str) -> tuple[Any, int | str]:
         f"the dataset has the variables {', '.join(maps) or 'none'}, none known as heights; name "
         "one (height_band='NAME'), or give the DataArray"
     )
+
+
+def plane_dimensions(array: Any, label: str) -> tuple[Hashable, Hashable]:
+    """The dimensions along x and y. Raises MapError where they are not known."""
+    return _dimension(array, "x", label), _dimension(array, "y", label)
 
 
 def _dimension(array: Any, axis: str, label: str) -> Hashable:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from .._support.memory import BLOCK
 from ..errors import MapError
 from ..surface.bounds import Bounds
+from ..surface.georeference import metres_of
 from ..surface.layers import Kind
 from ..surface.raster import Grid
 from ..validation import Array
@@ -23,6 +24,9 @@ SAMPLED_ROWS = 16
 LEAST_SHARE = 0.5  # a coarse cell needs data in this share of its cells
 FEWEST_LEVELS = 16  # distinct heights that are needed to find their rounding step
 MOST_LOOKED_AT = 1_000_000  # heights that are searched for the rounding step
+# All values that programs write for no data are beyond these two, so that most maps can be
+# dismissed at a glance, and other fills lie at least so far below the ground, metres.
+USUAL, DEPTH = (-998.0, 9998.0), 300.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +34,18 @@ class Band(ABC):
     """A band: its grid, and how to read it.
 
     label : its name in messages. unit : "" where unknown. step : what its numbers are rounded to
-    where they are stored as integers; 0 otherwise.
+    where they are stored as integers; 0 otherwise. unit_of_axes : of the coordinates, where
+    there is no CRS that names it. is_placed : does the map say where its cells lie? largest :
+    the largest number that its type of 8 or 16 bits without a sign can hold; 0 for others.
     """
 
     grid: Grid
     label: str
     unit: str
     step: float
+    unit_of_axes: str = field(default="", kw_only=True)
+    is_placed: bool = field(default=True, kw_only=True)
+    largest: int = field(default=0, kw_only=True)
 
     @abstractmethod
     def read(self, rows: slice, columns: slice) -> Array:
@@ -46,6 +55,11 @@ class Band(ABC):
     def rows_at_once(self) -> int:
         """How many rows the file stores together in one block."""
         return 1
+
+    @property
+    def scaling(self) -> tuple[float, float]:
+        """The scale and the offset of its stored numbers."""
+        return 1.0, 0.0
 
 
 class Part(NamedTuple):
@@ -76,6 +90,12 @@ class View:
         """The grid of the cells that are read."""
         window = self.band.grid.window(self.rows, self.columns)
         return window if self.factor == 1 else window.coarser(self.factor)
+
+    @property
+    def is_whole(self) -> bool:
+        """Is it all of the band?"""
+        grid = self.band.grid
+        return (self.rows, self.columns) == (slice(0, grid.rows), slice(0, grid.columns))
 
     def coarser(self, factor: int) -> View:
         """The same part with cells ``factor`` times as wide and as high."""
@@ -135,7 +155,7 @@ class View:
                 f"decimate={factor}"
             )
 
-    def _strips(self) -> Iterator[tuple[int, Array]]:
+    def strips(self) -> Iterator[tuple[int, Array]]:
         """Blocks of rows, each with the index of its first; they do not cut a coarse cell."""
         width = self.columns.stop - self.columns.start
         unit = math.lcm(self.factor, self.band.rows_at_once)
@@ -162,6 +182,20 @@ class View:
             ]
         )
 
+    def looks_usual(self) -> bool:
+        """Are all values so moderate that none can stand for no data?"""
+        low, high = np.inf, -np.inf
+        if self.band.scaling != (1.0, 0.0):  # fills are stored as they are
+            return False
+        for _, strip in replace(self, factor=1).strips():
+            values = strip[np.isfinite(strip)]
+            if values.size:
+                low, high = min(low, float(values.min())), max(high, float(values.max()))
+            metres = metres_of(self.band.unit) or 1.0
+            if low < USUAL[0] or high > USUAL[1] or (high - low) * metres >= DEPTH:
+                return False
+        return True
+
     def read_as(self, target: Grid, out: Array) -> bool:
         """Read into ``out`` if the target has the same cells, with its rows in either order.
 
@@ -178,7 +212,7 @@ class View:
 
     def read_into(self, out: Array) -> None:
         """Read the values of the grid's cells into ``out`` (rows, columns)."""
-        for start, strip in self._strips():
+        for start, strip in self.strips():
             means = strip if self.factor == 1 else _block_means(strip, self.factor)
             first = start // self.factor
             out[first : first + len(means)] = means

@@ -12,6 +12,7 @@ from .. import __version__
 from .._support.files import written_whole
 from ..distance.field import DistanceField
 from ..errors import MapError
+from ..surface.ground import quantity, value_unit
 from ..validation import Array
 
 
@@ -35,7 +36,8 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
     from rasterio.io import MemoryFile
 
     values, transform = _north_up(field)
-    reference, unit = field.surface.georeference, field.surface.unit
+    reference, unit = field.surface.georeference, value_unit(field.surface)
+    name = quantity(field.surface)
     profile: dict[str, object] = {
         "driver": "GTiff",
         "width": values.shape[1],
@@ -52,7 +54,7 @@ def _write_geotiff(field: DistanceField, file: Path) -> None:
     with MemoryFile() as memory:
         with memory.open(**profile) as dataset:
             dataset.write(values, 1)
-            dataset.set_band_description(1, f"distance ({unit})" if unit else "distance")
+            dataset.set_band_description(1, f"{name} ({unit})" if unit else name)
             dataset.units = (unit,)
             dataset.update_tags(**_tags(field))
         file.write_bytes(memory.read())
@@ -68,7 +70,7 @@ def _write_npz(field: DistanceField, file: Path) -> None:
             x=field.lattice.x,
             y=field.lattice.y,
             source=np.array(field.source),
-            unit=field.surface.unit,
+            unit=value_unit(field.surface),
             crs="" if reference is None else reference.crs.to_wkt(),
         )
 

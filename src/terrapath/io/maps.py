@@ -2,147 +2,28 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, Union
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from pyproj import CRS
 
-from ..errors import InputError, MapError
+from ..errors import InputError, MapError, MapWarning, tell
 from ..surface import Surface
 from ..surface.bounds import as_bounds
-from ..surface.georeference import Georeference, metres_of, parse_crs
+from ..surface.georeference import Georeference, metres_of
 from ..surface.raster import Grid, Raster
 from ..validation import Array, require_count, require_not_negative
 from .bands import Band, Part, View, quantisation_step
-from .rasters import classic_netcdf, gdal, open_band, open_classic_netcdf, reading
+from .rasters import gdal
+from .sources import LayerSource, NoData, Source, Unsaid
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-    from xarray import DataArray, Dataset
-
     from ..surface.layers import Kind
-
-
-# What GDAL reads under a name, an object of xarray, or (values, x, y).
-Source: TypeAlias = Union[
-    str, Path, "DataArray", "Dataset", "tuple[ArrayLike, ArrayLike, ArrayLike]"
-]
-
-_TEXT = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?", re.DOTALL)
-
-
-@dataclass(frozen=True)
-class LayerSource:
-    """Where a layer comes from: a band of a map, and the layer's weight.
-
-    path : a file, an xarray DataArray or Dataset, or (values, x, y). band : its number, from
-    1, or the name of a variable.
-    """
-
-    path: Source
-    band: int | str = 1
-    weight: float = 1.0
-
-    @classmethod
-    def parse(cls, text: str) -> LayerSource:
-        """From text of the form ``FILE[:BAND][*WEIGHT]``."""
-        match = _TEXT.fullmatch(text)
-        try:
-            if match is None:
-                raise ValueError
-            weight = 1.0 if match["weight"] is None else float(match["weight"])
-        except ValueError:
-            raise InputError(
-                f"layer {text!r} is not of the form FILE[:BAND][*WEIGHT], as in rocks.tif:3*20"
-            ) from None
-        require_not_negative(**{f"the weight of layer {text!r}": weight})
-        return cls(_as_path(match["path"]), int(match["band"] or 1), weight)
-
-    @classmethod
-    def of_file(cls, name: str, band: int = 1, weight: float = 1.0) -> LayerSource:
-        """A band of a file, or of another source that GDAL knows by this name."""
-        require_not_negative(**{f"the weight of {name}": weight})
-        return cls(_as_path(name), band, weight)
-
-    @classmethod
-    def of_heights(cls, source: Source, band: int | str) -> LayerSource:
-        """A band of a map; in its name, no band and no weight is looked for."""
-        return cls(_as_path(source) if isinstance(source, str) else source, band)
-
-    @classmethod
-    def of(cls, source: LayerSource | Source) -> LayerSource:
-        """From a LayerSource, a path, an array, or text as ``parse`` takes it."""
-        if isinstance(source, cls):
-            return source
-        if isinstance(source, str):
-            return cls.parse(source)
-        if isinstance(source, (Path, tuple)) or _is_xarray(source):
-            return cls(source)  # type: ignore[arg-type] # mypy cannot see that it is xarray's
-        shown = " ".join(repr(source).split())
-        raise InputError(
-            f"layer source {shown:.60} is not a path, FILE:BAND*WEIGHT, an xarray object or "
-            "LayerSource"
-        )
-
-    def open(self, files: ExitStack, crs: CRS | None, *, heights: bool) -> Band:
-        """Open the band; its file stays open until ``files`` is closed.
-
-        crs : the CRS of a map that has none. heights : must its numbers be heights?
-        """
-        if isinstance(self.band, bool) or not isinstance(self.band, (int, str)):
-            raise InputError(
-                f"band={self.band!r} is neither a number, from 1, nor a variable's name"
-            )
-        if not isinstance(self.path, (str, Path)):
-            return _band_of_array(self.path, self.band, crs)
-        if (classic := classic_netcdf(self.path)) is not None:
-            return _band_of_netcdf(self.path, *classic, self.band, files, crs)
-        return open_band(self.path, self.band, files, crs=crs, heights=heights)
-
-
-def _as_path(text: str) -> Path | str:
-    """A Path; or the text itself where GDAL reads it as something else, as a Path drops slashes."""
-    return text if "://" in text or text.startswith("/vsi") else Path(text)
-
-
-def _is_xarray(source: object) -> bool:
-    """Is it an xarray object? Checked without importing xarray."""
-    return type(source).__module__.split(".")[0] == "xarray"
-
-
-def _band_of_array(source: Any, band: int | str, crs: CRS | None) -> Band:
-    from .arrays import band_of_numpy, band_of_xarray
-
-    if _is_xarray(source):
-        return band_of_xarray(source, band, crs)
-    if isinstance(source, tuple) and len(source) == 3:
-        return band_of_numpy(source, band, crs)
-    shown = " ".join(repr(source).split())
-    raise InputError(
-        f"source {shown:.60} is not a map; give a path, an xarray object, or (values, x, y)"
-    )
-
-
-def _band_of_netcdf(
-    name: str | Path,
-    file: Path,
-    variable: str | None,
-    band: int | str,
-    files: ExitStack,
-    crs: CRS | None,
-) -> Band:
-    from .arrays import band_of_xarray
-
-    dataset = open_classic_netcdf(file, files)
-    with reading(name):
-        return band_of_xarray(dataset, variable or band, crs, label=str(name))
-
+    from .undeclared import Fills
 
 # x_min, y_min, x_max, y_max in the map's own coordinates.
 Rectangle: TypeAlias = tuple[float, float, float, float]
@@ -162,9 +43,22 @@ class OpenMap:
     costs: Sources
     fill_holes: float
     smoothing: float | str | None
-    crs: CRS | None
+    unsaid: Unsaid
     files: ExitStack
     is_closed: bool = False
+
+    @cached_property
+    def _fills(self) -> Fills:
+        from .undeclared import Fills
+
+        return Fills(self.unsaid.no_data)
+
+    def _without_fills(self, view: View, *, heights: bool = False) -> View:
+        """The view, with what is no data without being declared as such."""
+        is_searched = self.unsaid.no_data == "auto"
+        if is_searched and view.looks_usual():
+            return view
+        return self._fills.blocked(view, heights=heights)
 
     def _require_open(self) -> None:
         if self.is_closed:
@@ -193,6 +87,7 @@ class OpenMap:
         base.require_size(most_cells)
         # Heights of damaged files may overflow. They are refused later, or become no-data.
         with gdal(), np.errstate(over="ignore", invalid="ignore"):
+            base = self._without_fills(base, heights=True)
             target = base.grid.planning_grid()
             bands = self._read(base, target, most_cells)
             factor, unit = self._into_plane_unit(bands[0], target)
@@ -233,8 +128,10 @@ class OpenMap:
     def _opened(self, name: str, kind: Kind, source: LayerSource) -> Part:
         from .alignment import placed
 
-        band = source.open(self.files, None, heights=False)
-        return Part(name, kind, source.weight, placed(name, band, self.heights.band.grid, self.crs))
+        band, grid = source.open(self.files), self.heights.band.grid
+        if self.unsaid.is_local:
+            band = replace(band, grid=replace(band.grid, crs=None))
+        return Part(name, kind, source.weight, placed(name, band, grid, self.unsaid.crs))
 
     def _read(self, base: View, target: Grid, most_cells: int) -> Array:
         """All layers (layers, rows, columns) on the cells of the target."""
@@ -244,14 +141,18 @@ class OpenMap:
                 return bands
         from .alignment import read_all
 
-        return read_all(self._parts, base, target, most_cells)
+        return read_all(self._parts, base, target, most_cells, self._without_fills)
 
     def _into_plane_unit(self, heights: Array, target: Grid) -> tuple[float, str]:
         """Convert heights to the plane's unit, in place; returns the factor and the new unit."""
-        if target.crs is None:
-            _require_no_degrees(heights, target, self.heights.band.label)
-        plane = "" if target.crs is None else Georeference(target.crs, target.crs).unit
-        factor, unit = _into_plane_unit(self.heights.band.unit, plane)
+        band = self.heights.band
+        if target.crs is None and not self.unsaid.is_local:
+            _require_no_degrees(heights, target, band.label)
+        plane = band.unit_of_axes
+        if target.crs is not None:
+            plane = Georeference(target.crs, target.crs).unit
+        _tell_of_unit(band, plane)
+        factor, unit = _into_plane_unit(band.unit, plane)
         if factor != 1.0:
             heights *= factor
         return factor, unit
@@ -267,6 +168,10 @@ def open_map(
     fill_holes: float = 0.0,
     smoothing: float | str | None = "auto",
     crs: CRS | str | int | None = None,
+    nodata: NoData = "auto",
+    height_unit: str | None = None,
+    cell_size: float | None = None,
+    height_range: tuple[float, float] | None = None,
 ) -> Iterator[OpenMap]:
     """Open a map, to count its cells and to read surfaces of it: of the whole, in part, coarser.
 
@@ -275,14 +180,14 @@ def open_map(
     the remedy.
     """
     require_not_negative(fill_holes=fill_holes)
-    given = parse_crs(crs, f"crs={crs!r}")
+    unsaid = Unsaid.of(crs, nodata, height_unit, cell_size, height_range)
     files = ExitStack()
     opened = None
     try:
         with gdal():
-            band = LayerSource.of_heights(source, height_band).open(files, given, heights=True)
+            band = LayerSource.of_heights(source, height_band).open(files, unsaid)
         heights = Part("height", "rise", 1.0, band)
-        opened = OpenMap(heights, layers or {}, costs or {}, fill_holes, smoothing, given, files)
+        opened = OpenMap(heights, layers or {}, costs or {}, fill_holes, smoothing, unsaid, files)
         yield opened
     finally:
         if opened is not None:
@@ -304,6 +209,24 @@ def _into_plane_unit(unit: str, plane: str) -> tuple[float, str]:
     return (1.0 if abs(factor - 1.0) < 1e-12 else factor), plane
 
 
+def _tell_of_unit(band: Band, plane: str) -> None:
+    """Tell of heights whose unit is not known, where it may be another one than the plane's."""
+    if metres_of(plane) is None or metres_of(band.unit) is not None:
+        return
+    if band.unit:
+        what = f"in {band.unit!r}, which is not a known unit of length, and are taken to be"
+    elif metres_of(plane) != 1.0:
+        what = "without a unit, and are taken to be"
+    else:
+        return
+    tell(
+        MapWarning(
+            f"{band.label}: heights are {what} in {plane}, as the plane is; give their unit by "
+            "--height-unit (height_unit= in Python)"
+        )
+    )
+
+
 def _require_no_degrees(heights: Array, grid: Grid, label: str) -> None:
     """Raise MapError where a map without a CRS seems to be in degrees."""
     x_min, y_min, x_max, y_max = grid.extent()
@@ -314,7 +237,8 @@ def _require_no_degrees(heights: Array, grid: Grid, label: str) -> None:
     if len(steps) and np.sqrt(np.square(steps).mean()) > STEEPEST_DEGREES:
         raise MapError(
             f"{label} has no CRS, and its coordinates, {x_min:.6g} to {x_max:.6g} and {y_min:.6g} "
-            f"to {y_max:.6g}, look like degrees; name its CRS, as in crs='EPSG:4326'"
+            f"to {y_max:.6g}, look like degrees; name its CRS, as in crs='EPSG:4326', or give "
+            "crs='none' to plan on them as they are"
         )
 
 
@@ -342,6 +266,10 @@ def read_surface(
     fill_holes: float = 0.0,
     smoothing: float | str | None = "auto",
     crs: CRS | str | int | None = None,
+    nodata: NoData = "auto",
+    height_unit: str | None = None,
+    cell_size: float | None = None,
+    height_range: tuple[float, float] | None = None,
     within: Rectangle | None = None,
     margin: float = 0.0,
     decimate: int = 1,
@@ -358,7 +286,12 @@ def read_surface(
     without data in any layer are blocked.
     smoothing : standard deviation, map units. "auto": where heights are rounded to a step, the
     least smoothing that they need, otherwise none. None or 0: none.
-    crs : the CRS of a map that has none. within : (x_min, y_min, x_max, y_max) in the map's own
+    crs : the CRS of a map that has none; "none": the map is a plane of its own, and no CRS is
+    looked for. nodata : "auto": what the map declares as no data, and values that stand out as
+    such, with a MapWarning; "none": only what it declares; or a further value. height_unit : of
+    heights that have none, "m" or "ft". cell_size : the side of the cells of a picture, which
+    does not say it. height_range : (low, high), the heights of a picture's darkest and brightest
+    numbers. within : (x_min, y_min, x_max, y_max) in the map's own
     coordinates; only this part is read. margin : how much more is read around it, map units of
     the plane. A vehicle's radius reaches over the edge, and ground that is not read cannot block
     it. decimate : means over blocks of this many cells a side are read. most_cells : a map with
@@ -376,6 +309,10 @@ def read_surface(
         fill_holes=fill_holes,
         smoothing=smoothing,
         crs=crs,
+        nodata=nodata,
+        height_unit=height_unit,
+        cell_size=cell_size,
+        height_range=height_range,
     ) as opened:
         return opened.surface(
             within=within, margin=margin, decimate=decimate, most_cells=most_cells

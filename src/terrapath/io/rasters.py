@@ -13,7 +13,6 @@ import numpy as np
 from pyproj import CRS
 from rasterio import Affine
 
-from .._support.extras import require_packages
 from ..errors import MapError, TerrapathError, silence
 from ..surface.georeference import parse_crs
 from ..surface.raster import Grid
@@ -79,11 +78,19 @@ class FileBand(Band):
     dataset: Any
     number: int
     path: str | Path
+    alphas: tuple[int, ...] = ()  # bands that say where there is nothing; GDAL minds only some
 
     @property
     def rows_at_once(self) -> int:
         """How many rows the file stores together in one block."""
         return int(self.dataset.block_shapes[self.number - 1][0])
+
+    @property
+    def scaling(self) -> tuple[float, float]:
+        """The scale and the offset of its stored numbers."""
+        return float(self.dataset.scales[self.number - 1]), float(
+            self.dataset.offsets[self.number - 1]
+        )
 
     def read(self, rows: slice, columns: slice) -> Array:
         """Values (rows, columns) with scale and offset applied, NaN where there is no data."""
@@ -94,9 +101,10 @@ class FileBand(Band):
         with reading(self.path):
             stored = self.dataset.read(self.number, window=window)
             masked = self.dataset.read_masks(self.number, window=window) == 0
+            for alpha in self.alphas:
+                masked |= self.dataset.read(alpha, window=window) == 0
             values: Array = stored.astype(np.float64)
-        scale = self.dataset.scales[self.number - 1]
-        offset = self.dataset.offsets[self.number - 1]
+        scale, offset = self.scaling
         with np.errstate(over="ignore", invalid="ignore"):
             if (scale, offset) != (1.0, 0.0):
                 values *= scale
@@ -106,11 +114,18 @@ class FileBand(Band):
 
 
 def open_band(
-    path: str | Path, number: int | str, files: Any, *, crs: CRS | None, heights: bool
+    path: str | Path,
+    number: int | str,
+    files: Any,
+    *,
+    crs: CRS | None,
+    heights: bool,
+    is_picture: bool = False,
 ) -> FileBand:
     """A band of a file, or of its subdataset; the dataset is closed with the stack ``files``.
 
     number : the band, 1-based, or the name of a variable. crs : the CRS of a file that has none.
+    heights : refuse colours. is_picture : of which a brightness is the height.
     """
     with reading(path):
         dataset = files.enter_context(open_dataset(path))
@@ -118,43 +133,19 @@ def open_band(
             name, number = (number, 1) if isinstance(number, str) else (None, number)
             dataset = files.enter_context(open_dataset(_variable(path, dataset, name)))
         _require_band(path, dataset, number)
-        _require_heights(path, dataset, number, heights)
+        _require_heights(path, dataset, number, heights and not is_picture)
         kind = np.dtype(dataset.dtypes[number - 1])
         return FileBand(
             grid=_grid(path, dataset, crs),
+            alphas=_alphas(path, dataset, number),
             label=str(path),
             unit=_unit(dataset, number),
             step=abs(dataset.scales[number - 1]) if kind.kind in "iu" else 0.0,
+            is_placed=not dataset.transform.is_identity,
+            largest=np.iinfo(kind).max if kind in (np.uint8, np.uint16) else 0,
             dataset=dataset,
             number=number,
             path=path,
-        )
-
-
-def classic_netcdf(path: str | Path) -> tuple[Path, str | None] | None:
-    """(file, variable or None) if a name is of a netCDF file of the classic format, else None.
-
-    GDAL's netCDF library is slow to load, and crashes on damaged files of this format.
-    """
-    match = re.fullmatch(r'(?i:netcdf):"?(.+?)"?(?::([^:"]+))?', str(path))
-    name, variable = (match[1], match[2]) if match else (str(path), None)
-    try:
-        with Path(name).open("rb") as file:
-            return (Path(name), variable) if file.read(3) == b"CDF" else None
-    except (OSError, ValueError):
-        return None
-
-
-def open_classic_netcdf(path: Path, files: Any) -> Any:
-    """The file as an xarray Dataset, read by SciPy; closed with the stack ``files``."""
-    require_packages(f"{path}, netCDF of the classic format,", "xarray")
-    import xarray
-
-    # It warns of attributes that contradict one another. Where this matters, values are missing.
-    silence(xarray.SerializationWarning, "xarray.conventions")
-    with reading(path):
-        return files.enter_context(
-            xarray.open_dataset(path, engine="scipy", decode_times=False, cache=False)
         )
 
 
@@ -206,6 +197,19 @@ def _require_band(path: str | Path, dataset: Any, number: int) -> None:
     raise MapError(f"band={number} is not in {path}; its bands are: {listed}{more}")
 
 
+def _alphas(path: str | Path, dataset: Any, number: int) -> tuple[int, ...]:
+    """The bands of opacity. Raises MapError where the wanted band is one itself."""
+    from rasterio.enums import ColorInterp
+
+    kinds = enumerate(dataset.colorinterp, start=1)
+    alphas = tuple(band for band, kind in kinds if kind == ColorInterp.alpha)
+    if number in alphas:
+        raise MapError(
+            f"band {number} of {path} is its alpha, which says where there is data; name another"
+        )
+    return alphas
+
+
 def _require_heights(path: str | Path, dataset: Any, number: int, heights: bool) -> None:
     """Raise MapError unless a band holds real numbers, not colours, in blocks of moderate size."""
     from rasterio.enums import ColorInterp
@@ -217,7 +221,8 @@ def _require_heights(path: str | Path, dataset: Any, number: int, heights: bool)
     if heights and kind.itemsize == 1 and dataset.colorinterp[number - 1] in colours:
         raise MapError(
             f"band {number} of {path} is a colour of a picture "
-            f"({dataset.colorinterp[number - 1].name}), not heights; give the elevation model"
+            f"({dataset.colorinterp[number - 1].name}), not heights; give the elevation model, or "
+            "--height-range LOW,HIGH if its brightness is the height"
         )
     rows, columns = dataset.block_shapes[number - 1]
     if int(rows) * int(columns) * kind.itemsize > MOST_BLOCK_BYTES:

@@ -13,6 +13,7 @@ from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
 from ..geodesics.alternatives import is_same, routes_of_fields, shortest
+from ..geodesics.cell_routes import shortest_through_cells
 from ..geodesics.refinement import refine
 from ..geodesics.visibility import is_flat, shortest_taut_path
 from ..problem import Path, Problem, Solution, Status
@@ -64,8 +65,9 @@ class Optimal:
     Candidates are the straight line, on flat ground the shortest path round the corners of
     obstacles, and the routes of the distance fields from both ends. Where the fields leave a
     doubt, on rough ground and among obstacles, fields on ever finer lattices follow, A* with 32, 16
-    and 8 neighbours, and a tree. All but the straight line are refined. The route from a start to a
-    goal is the same as back.
+    and 8 neighbours, and a tree. Where costs are constant in cells, the shortest path through
+    points on their sides is one, too, and leaves no doubt. All but the straight line are refined.
+    The route from a start to a goal is the same as back.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the shortest path before
     refinement; it is also the path returned where the run ends before a route was refined.
@@ -124,7 +126,7 @@ class _Run:
         self.tried: set[AStar | RRTStar] = set()
         self.failures: list[Exception] = []
         self.trying = SEARCHING
-        self.is_exact = self.is_sure = False
+        self.is_exact = self.is_sure = self.is_through_cells = False
         self.fields: tuple[DistanceField, DistanceField]  # of both ends, on the last lattice
 
     @property
@@ -161,6 +163,9 @@ class _Run:
     def searches(self) -> Iterator[tuple[str, Callable[[], object]]]:
         """The searches in their order, with what the progress calls each."""
         yield "trying the straight line", self.try_straight_line
+        if self.problem.surface.cost_cells is not None:
+            yield "trying the sides of cells", self.try_sides
+            yield "trying A*", partial(self.try_planner, AStar(neighbours=NEIGHBOURS[0]))
         if is_flat(self.problem):
             yield "trying the corners of obstacles", self.try_corners
         elif is_rough(self.problem.surface, self.problem.bounds):
@@ -187,6 +192,15 @@ class _Run:
         self.is_exact = not self.problem.free_space.circles
         self.refine(taut.path)
 
+    def try_sides(self) -> None:
+        """The shortest path through points on the sides of cells of constant cost."""
+        path = shortest_through_cells(self.problem, self.must_stop)
+        if path is not None:
+            self.keep_unrefined(path)
+            self.refine(path)
+            # A path across all cells, each at its own cost; fields show other routes.
+            self.is_through_cells = True
+
     def try_fields(self) -> None:
         """The routes of distance fields, on a finer lattice where a coarse one shows none."""
         for lattice in lattices(self.problem, self.planner.spacing):
@@ -210,7 +224,7 @@ class _Run:
         if not self.must_stop():
             self.refine_routes(path, routes)
         is_close = abs(self.distance - self.best) <= SURE * self.best
-        self.is_sure = self.is_exact or is_close
+        self.is_sure = self.is_exact or self.is_through_cells or is_close
         return True
 
     @property

@@ -14,7 +14,7 @@ from .._kernels.planners import rrt_star as kernels, tree as trees
 from .._kernels.planners.buckets import Buckets
 from .._kernels.planners.sampling import PATH_SHARE
 from ..problem import History, Path, Problem, SearchTree, Solution
-from ..problem.solution import sampled
+from ..problem.path import sampled
 from ..surface import Surface
 from ..surface.metric import ROUGH_FEATURES, ROUGH_TOLERANCE, chord, is_rough
 from ..validation import (

@@ -6,35 +6,38 @@ from typing import Any
 
 import numpy as np
 
-from ..io.routes.profile import Column, Slopes, further_layers, slopes
+from ..io.routes.profile import Column, Slopes, further_layers, heights, slopes
 from ..problem import Path, Solution
+from ..surface.ground import height_layer
 from ..validation import Array
 from .labels import AxisUnit, with_unit
 from .map_view import PATH_COLOUR
 
 HEIGHT_COLOUR, GROUND_COLOUR, LIMIT_COLOUR = "#6b5b3e", "#9a9a9a", "#8a2be2"
-LAYER_COLOUR = "#0b6e4f"
+LAYER_COLOUR, SIDE_COLOUR = "#0b6e4f", "#0b3dff"
 # Heights of the panels, inches.
 HEIGHT_PANEL, SLOPE_PANEL, LAYER_PANEL, TITLE = 2.6, 1.8, 1.2, 0.9
 WIDTH = 10.0
 
 
 def _draw_height(axes: Any, path: Path) -> None:
-    profile, height = path.profile, path.surface.layers[0]
-    values = profile.values[:, 0]
+    profile, layer = path.profile, height_layer(path.surface)
+    height = "" if layer is None else path.surface.layers[layer].name
+    values = heights(path, profile.points)
     axes.plot(profile.distance, values, color=HEIGHT_COLOUR, lw=1.6)
     spread = float(np.ptp(values)) or 1.0
     floor = float(values.min()) - 0.08 * spread
     axes.fill_between(profile.distance, floor, values, color=HEIGHT_COLOUR, alpha=0.25, lw=0)
     axes.set_ylim(floor, float(values.max()) + 0.08 * spread)
-    axes.set_ylabel(with_unit(height.name, height.unit))
+    axes.set_ylabel(with_unit(height or "no height", path.ground_unit))
 
 
 def _draw_slopes(axes: Any, distance: Array, slope: Slopes, limit: float | None) -> None:
     """The signed slope along the path, and the ground's steepest slope on both sides of zero."""
     band = {"color": GROUND_COLOUR, "alpha": 0.35, "lw": 0}
     axes.fill_between(distance, -slope.ground, slope.ground, label="of the ground", **band)
-    axes.plot(distance, slope.along, color=PATH_COLOUR, lw=1.0, label="along the route")
+    axes.plot(distance, slope.along, color=PATH_COLOUR, lw=1.0, label="along the route", zorder=3)
+    axes.plot(distance, slope.side, color=SIDE_COLOUR, lw=0.8, label="to the side")
     axes.axhline(0.0, color="black", lw=0.6)
     if limit is not None:
         style = {"color": LIMIT_COLOUR, "ls": "--", "lw": 1.2}
@@ -78,9 +81,9 @@ def draw_charts(figure: Any, solution: Solution, path: Path) -> None:
     for panel, shown in zip(axes[2:], more, strict=True):
         _draw_layer(panel, distance, shown)
     _mark_vias(axes, solution, path)
-    unit = AxisUnit.for_lengths(distance[-1], problem.surface.unit)
+    unit = AxisUnit.for_lengths(distance[-1], path.ground_unit)
     unit.apply(axes[-1].xaxis)
-    axes[-1].set_xlabel(unit.label("distance along the surface"))
+    axes[-1].set_xlabel(unit.label("distance on the ground"))
     axes[-1].set_xlim(0.0, distance[-1] or 1.0)
     for panel in axes:
         panel.grid(alpha=0.3)

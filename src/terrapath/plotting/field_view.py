@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..distance.field import DistanceField
 from ..problem import Problem
+from ..surface.ground import quantity, value_unit
 from ..validation import Array
 from .labels import AxisUnit
 from .map_view import draw_ground, draw_start
@@ -42,7 +43,7 @@ def _draw_lines(axes: Any, field: DistanceField, values: Array, unit: str) -> No
     shown = AxisUnit.for_lengths(float(values.max()), unit)
     for text in lines.clabel(fontsize=8, fmt=shown.format):
         text.set(color="black", path_effects=[halo])
-    label = shown.label("distance")
+    label = shown.label(quantity(field.surface))
     bar = axes.figure.colorbar(lines, ax=axes, label=label, shrink=0.72, pad=0.02)
     shown.apply(bar.ax.yaxis)
 
@@ -63,7 +64,7 @@ def draw_distances(axes: Any, field: DistanceField) -> None:
     values = np.ma.masked_invalid(field.values)
     _hatch(axes, field)
     if values.count() and values.max() > 0.0:
-        _draw_lines(axes, field, values, problem.surface.unit)
+        _draw_lines(axes, field, values, value_unit(problem.surface))
     draw_start(axes, problem)
     if len(axes.get_legend_handles_labels()[1]) > 1:  # not only the start has an entry
         axes.legend(loc="upper left", fontsize=8, framealpha=0.85).set_zorder(7)

@@ -12,9 +12,10 @@ from .._support.files import written_whole
 from ..distance.field import DistanceField
 from ..errors import MapError
 from ..problem import Solution
+from ..surface.ground import quantity, value_unit
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
-from .labels import format_length, in_words, straight_name
+from .labels import format_length, in_words, lengths_in_words, straight_name
 from .map_view import draw_map
 from .perspective import draw_perspective
 
@@ -28,7 +29,7 @@ FORMATS = (".png", ".svg", ".pdf", ".jpg")
 
 def _title(solution: Solution) -> str:
     problem = solution.problem
-    unit, length = problem.surface.unit, solution.length
+    unit, length = solution.unit, solution.length
     name = f"{in_words(problem.name)}: " if problem.name else ""
     if length is None:
         return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
@@ -40,14 +41,15 @@ def _title(solution: Solution) -> str:
     )
     refined = "" if solution.unrefined is None else ", refined"
     title = (
-        f"{name}{solution.planner}{refined}, length {format_length(length, unit)} "
+        f"{name}{solution.planner}{refined}, {lengths_in_words(solution)} "
         f"({against}), {solution.samples:,} samples"
     )
     if solution.lower_bound is None or solution.gap is None:
         return title
     bound = format_length(solution.lower_bound, unit)
-    gap = f"{100.0 * solution.gap:.3g} %"
-    return f"{title}\nproven: {solution.bound_in_words} than {bound}, a gap of {gap}"
+    return (
+        f"{title}\nproven: {solution.bound_in_words} than {bound}, a gap of {solution.gap_in_words}"
+    )
 
 
 def draw_route(solution: Solution) -> Any:
@@ -75,9 +77,9 @@ def draw_field(field: DistanceField) -> Any:
     figure = Figure(figsize=(FIELD_WIDTH + 1.6, height), layout="constrained")
     draw_distances(figure.add_subplot(), field)
     reached = field.values[np.isfinite(field.values)]
-    farthest = format_length(float(reached.max(initial=0.0)), field.surface.unit)
+    farthest = format_length(float(reached.max(initial=0.0)), value_unit(field.surface))
     start = ", ".join(f"{coordinate:.10g}" for coordinate in field.source)
-    figure.suptitle(f"distance from ({start}), at most {farthest}", fontsize=12)
+    figure.suptitle(f"{quantity(field.surface)} from ({start}), at most {farthest}", fontsize=12)
     return figure
 
 

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from ..io.routes.profile import clean
 from ..problem import Problem, Solution
+from ..surface.ground import is_weighted
 
 # Longer axes are in kilometres; metres.
 LONGEST_IN_METRES = 10_000.0
@@ -24,6 +25,16 @@ def with_unit(name: str, unit: str, gap: str = " ") -> str:
 def format_length(length: float, unit: str) -> str:
     """A length with its unit, as titles and legends show it."""
     return f"{length:{'.4f' if length < 1000.0 else ',.0f'}} {unit}".rstrip()
+
+
+def lengths_in_words(solution: Solution) -> str:
+    """The length of a solution's path on the ground, and the value where it is another."""
+    path = solution.path
+    assert path is not None
+    ground = format_length(path.ground_length, path.ground_unit)
+    if path.ground_length == path.length and not is_weighted(path.surface):
+        return f"length {ground}"
+    return f"{ground} on the ground, value {format_length(path.length, solution.unit)}"
 
 
 def straight_name(solution: Solution) -> str:

@@ -15,11 +15,11 @@ from .._support.extras import require_packages
 from .._support.files import written_whole
 from ..errors import MapError
 from ..io.routes.profile import clean, slopes
-from ..io.routes.units import height_scale
 from ..problem import Path as Route, Solution
 from ..space.free_space import sort_obstacles
+from ..surface.ground import height_scale
 from ..validation import Array
-from .labels import format_length
+from .labels import format_length, lengths_in_words
 from .map_view import ALTERNATIVE_COLOURS, PATH_COLOUR
 from .terrain import LAYER_COLOURS, Terrain, height_colours
 
@@ -61,7 +61,7 @@ class Stage(NamedTuple):
         side = max(bounds.width, bounds.height)
         corner = np.array([bounds.x1_min, bounds.x2_min])
         origin = np.where(np.abs(corner).max() > FAR * side, np.floor(corner), 0.0)
-        scale = 1.0 / height_scale(problem.surface)
+        scale = 1.0 / height_scale(problem.surface, problem.surface.layers[0])
         terrain = Terrain.sample(problem, SAMPLES)
         return cls(solution, terrain, origin, scale, LIFT * side * scale)
 
@@ -101,7 +101,7 @@ def _terrain_traces(stage: Stage) -> list[Any]:
     layer = min(1, len(surface.layers) - 1)
     height, shown, norm = surface.layers[0], surface.layers[layer], terrain.norm(layer)
     points = np.stack(np.meshgrid(terrain.x, terrain.y), axis=-1)
-    gradients = height_scale(surface) * surface.gradients(points)[..., 0, :]
+    gradients = height_scale(surface, height) * surface.gradients(points)[..., 0, :]
     steepness = np.degrees(np.arctan(np.hypot(gradients[..., 0], gradients[..., 1])))
     place: dict[str, Any] = {"x": terrain.x - stage.origin[0], "y": terrain.y - stage.origin[1]}
     hover = f"{_shown(height.name)} %{{z:.6g}}{_suffix(height.unit)}"
@@ -198,19 +198,22 @@ def _route_traces(stage: Stage) -> list[Any]:
         solution.path.profile,
         _drawn_indices(solution.path),
     )
-    height, unit = surface.layers[0], surface.unit
-    # Distance, height, slope along, slope of the ground, place.
-    shown = np.column_stack([profile.distance, profile.values[:, 0], *slopes(solution.path)])
-    shown = np.column_stack([shown, profile.points])[kept]
+    height, unit = surface.layers[0], solution.path.ground_unit
+    along, ground, side = slopes(solution.path)
+    # Distance, height, slopes, place, value.
+    shown = np.column_stack([profile.distance, profile.values[:, 0], along, ground])
+    shown = np.column_stack([shown, profile.points, side, profile.value])[kept]
     template = (
         f"distance %{{customdata[0]:.6g}}{_suffix(unit)}"
+        f"<br>value %{{customdata[7]:.6g}}{_suffix(solution.unit)}"
         f"<br>{_shown(height.name)} %{{customdata[1]:.6g}}{_suffix(height.unit)}"
-        "<br>slope %{customdata[2]:.1f} degrees, of the ground %{customdata[3]:.1f}"
+        "<br>slope %{customdata[2]:.1f} degrees, of the ground %{customdata[3]:.1f}, "
+        "to the side %{customdata[6]:.1f}"
         "<br>at %{customdata[4]:.10g}, %{customdata[5]:.10g}<extra></extra>"
     )
     traces = []
     for route, colour in zip(solution.alternatives, ALTERNATIVE_COLOURS, strict=False):
-        name = f"next best, {format_length(route.length, escape(unit))}"
+        name = f"next best, {format_length(route.length, escape(solution.unit))}"
         line = {"color": colour, "width": 4, "dash": "dash"}
         points = route.profile.points[_drawn_indices(route)]
         traces.append(
@@ -259,15 +262,15 @@ def _marks(stage: Stage) -> list[Any]:
 
 
 def _title(solution: Solution) -> str:
-    unit, length = solution.problem.surface.unit, solution.length
+    unit, length = solution.unit, solution.length
     name = f"{solution.problem.name}: " if solution.problem.name else ""
     if length is None:
         return f"{name}{solution.planner} found no path"
-    text = f"{name}{solution.planner}, length {format_length(length, unit)}"
+    text = f"{name}{solution.planner}, {lengths_in_words(solution)}"
     if solution.lower_bound is None or solution.gap is None:
         return text
     bound = format_length(solution.lower_bound, unit)
-    return f"{text}; {solution.bound_in_words} than {bound}, a gap of {100.0 * solution.gap:.3g} %"
+    return f"{text}; {solution.bound_in_words} than {bound}, a gap of {solution.gap_in_words}"
 
 
 def _axis_title(name: str, unit: str, origin: float) -> dict[str, str]:

@@ -14,7 +14,7 @@ def draw_profiles(axes: Any, paths: Mapping[str, Path], layer: int) -> None:
     """Draw the values of one layer along each path, against the share of its length."""
     for (label, path), colour in zip(paths.items(), COLOURS, strict=False):
         profile = path.profile
-        share = profile.distance / profile.distance[-1]
+        share = profile.value / profile.value[-1]
         axes.plot(100.0 * share, profile.values[:, layer], color=colour, lw=1.8, label=label)
         shown = path.surface.layers[layer]
     unit = f" ({shown.unit})" if shown.unit else ""

@@ -1,9 +1,8 @@
 from . import scenes as scenes
+from .path import Path as Path, Profile as Profile
 from .problem import Problem as Problem
 from .solution import (
     History as History,
-    Path as Path,
-    Profile as Profile,
     SearchTree as SearchTree,
     Solution as Solution,
     Status as Status,

@@ -17,7 +17,7 @@ from ..space.lattice import Cells, Spacing, default_spacing
 from ..surface import Mask, Surface, metric
 from ..surface.bounds import Bounds, as_bounds
 from ..validation import Point, PointLike, as_point, require_not_negative
-from .solution import Path
+from .path import Path
 
 if TYPE_CHECKING:
     from ..space.constraints import Area, Constraints

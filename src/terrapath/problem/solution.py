@@ -5,114 +5,18 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
-import shapely
 
-from ..surface import Surface, metric
+from ..surface.ground import is_weighted, value_unit
 from ..validation import Array
+from .path import Path
 
 if TYPE_CHECKING:
     from .problem import Problem
-
-
-# Points a path is cut into to add up climb and draw profiles, unless the surface is finer.
-PROFILE_POINTS = 256
-
-
-def sampled(points: Array, finest: float) -> Array:
-    """A polyline (m, 2) whose segments are cut into equal ones, no longer than ``finest``.
-
-    Where ``finest`` is 0 the segments stay as they are.
-    """
-    moves = np.diff(points, axis=0)
-    sizes = np.hypot(*moves.T) / finest if finest > 0.0 else np.ones(len(moves))
-    counts = np.maximum(np.ceil(sizes), 1.0).astype(np.intp)
-    piece = np.repeat(np.arange(len(moves)), counts)
-    place = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(counts) - counts, counts)
-    # The last point is exactly the segment's end, despite rounding.
-    shares = np.where(place == counts[piece], 1.0, place * (1.0 / counts)[piece])
-    return np.concatenate([points[:1], points[piece] + shares[:, None] * moves[piece]])
-
-
-@dataclass(frozen=True, eq=False)
-class Path:
-    """A polyline on the plane, and the curve on the surface above it.
-
-    surface : the surface. points : (m, 2), map units, from start to goal.
-    """
-
-    surface: Surface
-    points: Array
-
-    @cached_property
-    def length(self) -> float:
-        """True length under h, map units, to 1e-9 relative."""
-        return metric.curve_length(self.surface, self.points)
-
-    @cached_property
-    def line(self) -> shapely.LineString:
-        """The path on the plane, map units."""
-        return shapely.LineString(self.points)
-
-    @cached_property
-    def profile(self) -> Profile:
-        """The surface along the path, sampled finely enough to show every feature of it."""
-        finest = min(0.25 * self.surface.resolution, self.line.length / PROFILE_POINTS)
-        points = sampled(self.points, finest)
-        steps = metric.segment_lengths(self.surface, points[:-1], points[1:])
-        distance = np.concatenate([[0.0], np.cumsum(steps)])
-        values, costs = self.surface.values(points), self.surface.cost_values(points)
-        return Profile(points, distance, values, costs)
-
-    @cached_property
-    def contributions(self) -> dict[str, float]:
-        """How much of the length each part makes: shares that add up to 1, by their names.
-
-        "plane" is the share of the movement on the plane, and each layer has its own. Without
-        costs, a step ds under h is the sum of dx_i^2 / ds over all coordinates of R^n, one for
-        each share. A cost layer's share is the length that it adds by its factor; it is negative
-        where the factor is below 1. Several cost layers divide what they add by the logarithms
-        of their factors.
-        """
-        surface, profile = self.surface, self.profile
-        steps = np.diff(np.hstack([profile.points, profile.values * surface.data.weights]), axis=0)
-        sizes = np.maximum(np.linalg.norm(steps, axis=1), 1e-300)
-        parts = np.square(steps) / sizes[:, None]
-        amounts = {"plane": float(parts[:, :2].sum())}
-        for layer, part in zip(surface.layers, parts[:, 2:].T, strict=True):
-            amounts[layer.name] = float(part.sum())
-        if surface.costs:
-            middles = 0.5 * (profile.points[1:] + profile.points[:-1])
-            weights = np.array([layer.weight for layer in surface.costs])
-            logs = weights * np.log(surface.cost_values(middles))
-            total = logs.sum(axis=1)
-            each = np.where(np.abs(total) > 1e-12, np.expm1(total) / (total + 1e-300), 1.0)
-            for layer, log in zip(surface.costs, logs.T, strict=True):
-                amounts[layer.name] = float((log * each * sizes).sum())
-        whole = sum(amounts.values())
-        if whole == 0.0:
-            return dict.fromkeys(amounts, 0.0)
-        return {name: amount / whole for name, amount in amounts.items()}
-
-    @cached_property
-    def climb(self) -> float:
-        """The sum of all rises of the first layer along the path, in the layer's unit."""
-        rises = np.diff(self.profile.values[:, 0])
-        return float(rises[rises > 0.0].sum())
-
-
-class Profile(NamedTuple):
-    """The surface along a path, sampled."""
-
-    points: Array  # (m, 2), map units
-    distance: Array  # (m,), length under h from the start, map units
-    values: Array  # (m, layers), in the layers' units
-    costs: Array  # (m, costs), the factors of the cost layers, without weights
 
 
 class Status(enum.Enum):
@@ -137,6 +41,9 @@ _MESSAGES = {
     Status.INTERRUPTED: "stopped by the user; the path, if any, is the best so far",
 }
 
+
+# A gap above this proves little, and is called so.
+LARGE_GAP = 0.1
 
 # Why a path that was found is not returned.
 TOUCHES = "the path found touches an obstacle"
@@ -250,6 +157,16 @@ class Solution:
         return None if self.path is None else self.path.length
 
     @property
+    def value(self) -> float | None:
+        """What is minimised, measured on the path returned, in ``unit``, to 1e-9 relative."""
+        return self.length
+
+    @property
+    def unit(self) -> str:
+        """The unit of ``value``: that of the map, or "weighted m" with weights, layers or costs."""
+        return value_unit(self.problem.surface)
+
+    @property
     def gap(self) -> float | None:
         """(length - lower_bound) / lower_bound; infinite where the lower bound is 0."""
         if self.length is None or self.lower_bound is None:
@@ -281,7 +198,22 @@ class Solution:
         """What the lower bound says, in words, such as "no path is shorter"."""
         which = " through these points" if self.legs else ""
         where = "" if self.corridor is None else " in the corridor"
-        return f"no path{which}{where} is shorter"
+        verb = "costs less" if is_weighted(self.problem.surface) else "is shorter"
+        return f"no path{which}{where} {verb}"
+
+    @property
+    def gap_in_words(self) -> str:
+        """The gap in percent, and what a large one means; empty where there is none."""
+        if self.gap is None:
+            return ""
+        if math.isinf(self.gap):
+            return "infinite: nothing is proven, because the lower bound is 0"
+        text = f"{100.0 * self.gap:.3g} %"
+        if self.gap <= LARGE_GAP:
+            return text
+        less = "cost {} less" if is_weighted(self.problem.surface) else "be {} shorter"
+        saving = less.format(f"{100.0 * self.gap / (1.0 + self.gap):.3g} %")
+        return f"{text}, which proves little: the best path may {saving}"
 
     def __repr__(self) -> str:
         length = "no path" if self.length is None else f"length {self.length:.6f}"
@@ -293,9 +225,15 @@ class Solution:
 
 def _kept(problem: Problem, path: Path | None) -> Path | None:
     """The path where the problem allows it, or one beside it that is allowed, or None."""
-    if path is None or problem.allows(path):
+    space = problem.free_space
+    if path is None or path._free_in is space:
         return path
-    from .mending import mended
+    kept: Path | None = path
+    if not problem.allows(path):
+        from .mending import mended
 
-    points = mended(problem.free_space, path.points)
-    return None if points is None else Path(path.surface, points)
+        points = mended(space, path.points)
+        kept = None if points is None else Path(path.surface, points)
+    if kept is not None:
+        object.__setattr__(kept, "_free_in", space)
+    return kept

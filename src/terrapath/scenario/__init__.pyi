@@ -1,6 +1,5 @@
 from .answers import Answer as Answer, answer as answer, check as check, field as field
 from .checked import scenario_schema as scenario_schema
-from .loading import load as load
-from .scenario import Scenario as Scenario
+from .scenario import Scenario as Scenario, load as load
 from .templates import template as template
 from .toml import ScenarioError as ScenarioError

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, TerrapathWarning, collecting
 from ..planners.base import PROVING, Callback, Progress
+from ..surface.ground import value_unit
 from .option import Point
 from .question import Itinerary, Question, open_question
 from .scenario import Scenario, require_scenario
@@ -69,7 +70,10 @@ def _goal_record(answer: GoalAnswer) -> dict[str, object]:
     return {
         "goal": list(answer.goal),
         "status": goal_status(answer),
+        "value": None if solution is None else solution.value,
+        "unit": None if solution is None else solution.unit,
         "length": None if solution is None else solution.length,
+        "ground_length": None if path is None else path.ground_length,
         "lower_bound": answer.least if math.isfinite(answer.least) else None,
         "path": None if path is None else path.points.tolist(),
     }
@@ -268,7 +272,7 @@ class _Run:
         problem : None where it is made later, from a part of a map.
         """
         surface = None if problem is None else problem.surface
-        unit = "" if surface is None else surface.unit
+        unit = "" if surface is None else value_unit(surface)
         watch = None if self.watch is None else _with_unit(self.watch, unit)
         if not (self.planner.bound or self.planner.target_gap is not None):
             yield watch

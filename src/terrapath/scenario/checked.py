@@ -8,8 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from .option import Declared, declared
-from .scenario import SECTIONS, Scenario, options
-from .sections import LayerTable
+from .scenario import SECTIONS, LayerTable, Scenario, options
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter

@@ -19,6 +19,7 @@ Point: TypeAlias = tuple[float, float]
 Points: TypeAlias = tuple[Point, ...]
 Rectangle: TypeAlias = tuple[float, float, float, float]
 Files: TypeAlias = tuple[str, ...]
+Interval: TypeAlias = tuple[float, float]
 Extent: TypeAlias = float | Literal["auto", "none"]
 
 # What a value has to be, in words.

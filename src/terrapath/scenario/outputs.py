@@ -18,12 +18,13 @@ if TYPE_CHECKING:
 
 def require_outputs(paths: Sequence[Path], inputs: Iterable[str]) -> None:
     """Raise MapError where a file cannot be written, is named twice, or is an input."""
-    from .._support.files import require_writable
+    from .._support.files import parts_of, require_writable
 
+    parts = [(part, path) for path in paths for part in parts_of(path)]
     for path in paths:
         require_writable(path)
-    places = {_place(path): path for path in paths}
-    if len(places) < len(paths):
+    places = {_place(part): path for part, path in parts}
+    if len(places) < len(parts):
         raise MapError("the same file is named twice among the outputs; name each once")
     for name in inputs:
         lost = places.keys() & set(_places_of(name))
@@ -83,6 +84,12 @@ class RouteOutputs:
         return [Path(file) for file in self.section.files]
 
     @property
+    def tolerance(self) -> float | None:
+        """How far the route may be from what is written, map units; None for the default."""
+        given = self.section.simplify
+        return {"auto": None, "none": 0.0}[given] if isinstance(given, str) else given
+
+    @property
     def certificates(self) -> list[Path]:
         """The files of certificates, one for each leg."""
         path = _path(self.section.certificate)
@@ -93,6 +100,10 @@ class RouteOutputs:
         from ..io.routes import require_known_format
 
         section = self.section
+        if self.tolerance is not None:
+            from ..validation import require_not_negative
+
+            require_not_negative(simplify=self.tolerance)
         for path in self.files:
             require_known_format(path)
         pictures = [Path(name) for name in (section.plot, section.profile) if name is not None]
@@ -123,7 +134,7 @@ class RouteOutputs:
 
         section = self.section
         for path in self.files:
-            write_route(solution, path)
+            write_route(solution, path, simplify=self.tolerance)
         for path, leg in zip(self.certificates, solution.legs or [solution], strict=False):
             if leg.certificate is None:
                 tell(UnfinishedWarning(f"{path} was not written: no lower bound was proven"))

@@ -14,13 +14,13 @@ import numpy as np
 from ..errors import InputError
 from ..validation import is_there, require_not_negative
 from .option import Point, Rectangle
-from .scenario import Scenario, require_scenario
-from .sections import LayerTable, MapSection
+from .scenario import LayerTable, MapSection, Scenario, require_scenario
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from ..io.maps import LayerSource, OpenMap
+    from ..io.maps import OpenMap
+    from ..io.sources import LayerSource
     from ..planners.corridor import Corridor, Part
     from ..problem import Problem
     from ..surface import Surface
@@ -66,12 +66,16 @@ def open_question(scenario: Scenario) -> Iterator[Question]:
         fill_holes=place.fill_holes,
         smoothing=None if place.smooth == "none" else place.smooth,
         crs=place.crs,
+        nodata=place.nodata,
+        height_unit=place.height_unit,
+        cell_size=place.cell_size,
+        height_range=place.height_range,
     ) as opened:
         yield Question(scenario, opened)
 
 
 def _sources(tables: dict[str, LayerTable]) -> dict[str, LayerSource]:
-    from ..io.maps import LayerSource
+    from ..io.sources import LayerSource
 
     return {
         name: LayerSource.of_file(table.file, table.band, table.weight)
@@ -172,8 +176,9 @@ class Question:
         scene = load(place.scene or "")
         if place != MapSection(scene=place.scene, weights=place.weights):
             raise InputError(
-                "--layer, --cost, --height-band, --fill-holes, --smooth and --crs describe a "
-                f"raster, but {scene.name!r} is a built-in scene; leave them out, or name a file"
+                "--layer, --cost, --height-band, --fill-holes, --smooth, --crs and the like "
+                f"describe a raster, but {scene.name!r} is a built-in scene; leave them out, or "
+                "name a file"
             )
         ends = {"start": scene.start, "goal": scene.goal}
         return Place(scene.surface, scene.bounds, scene.name, ends)

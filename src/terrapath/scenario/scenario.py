@@ -1,18 +1,160 @@
-"""All options together: a question to Terrapath."""
+"""A question to Terrapath: its map and all options together, and how it is put together."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, TypeAlias
+from pathlib import Path
+from typing import Annotated, ClassVar, TypeAlias
 
 from ..errors import InputError
-from .option import STRICT, Declared, declared
-from .sections import ConstraintsSection, MapSection, OutputSection, PlannerSection, RouteSection
+from .option import (
+    NUMBER,
+    STRICT,
+    TEXT,
+    WHOLE,
+    Declared,
+    Extent,
+    Files,
+    Interval,
+    Option,
+    a_file,
+    a_number,
+    declared,
+)
+from .sections import ConstraintsSection, OutputSection, PlannerSection, RouteSection
 
 # Values by section and key.
 Given: TypeAlias = Mapping[str, Mapping[str, object]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayerTable:
+    """A band of a raster as a layer."""
+
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
+
+    file: Annotated[str, a_file("The raster.", '"layer.tif"')]
+    band: Annotated[int, Option("Its band, 1-based.", WHOLE)] = 1
+    weight: Annotated[
+        float,
+        Option(
+            "Of a layer: the map units of travel that a change of one unit counts as. Of a cost: "
+            "the exponent of the multiplier.",
+            NUMBER,
+        ),
+    ] = 1.0
+
+
+LayerTables: TypeAlias = dict[str, LayerTable]
+Weights: TypeAlias = dict[str, float]
+A_LAYER = "a table with file, band and weight"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapSection:
+    """The ground: a raster with its layers, or a built-in scene."""
+
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
+
+    path: Annotated[str | None, a_file("A raster that GDAL can read.", '"dem.tif"')] = None
+    scene: Annotated[
+        str | None, Option("A built-in scene, see `terrapath scenes`.", TEXT, example='"six-peaks"')
+    ] = None
+    height_band: Annotated[
+        int | str | None,
+        Option(
+            "Band of the heights: its number, or the name of a variable [default: 1].",
+            "a whole number, or the name of a variable as text",
+            form="BAND",
+            example="1",
+        ),
+    ] = None
+    fill_holes: Annotated[
+        float,
+        a_number(
+            "Fill holes without data whose longer side is at most this long, map units; larger "
+            "holes stay blocked [default: 0, none].",
+            "SIZE",
+        ),
+    ] = 0.0
+    smooth: Annotated[
+        Extent,
+        Option(
+            "Smooth over this length (standard deviation, map units); auto takes the least that "
+            "heights rounded to a step need [default], none leaves the map as it is.",
+            'a finite number, "auto" or "none"',
+            form="LENGTH|auto|none",
+        ),
+    ] = "auto"
+    crs: Annotated[
+        str | None,
+        Option(
+            "CRS of a map that has none, as EPSG:32617; none for a plane of its own, without a "
+            "place on Earth.",
+            TEXT,
+            "CRS",
+            (),
+            '"EPSG:32617"',
+        ),
+    ] = None
+    nodata: Annotated[
+        Extent,
+        Option(
+            "Heights with this value are no data; auto finds such values where they stand out and "
+            "says so [default], none takes only what the map declares.",
+            'a finite number, "auto" or "none"',
+            form="VALUE|auto|none",
+        ),
+    ] = "auto"
+    height_unit: Annotated[
+        str | None,
+        Option("Unit of heights that have none, as ft.", TEXT, "UNIT", (), '"ft"'),
+    ] = None
+    cell_size: Annotated[
+        float | None,
+        a_number("Side of the cells of a picture, which does not say it, map units.", "D", "0.5"),
+    ] = None
+    height_range: Annotated[
+        Interval | None,
+        Option(
+            "The heights of a picture's darkest and brightest numbers.",
+            "two finite numbers, [LOW, HIGH]",
+            form="LOW,HIGH",
+            example="[0.0, 120.0]",
+        ),
+    ] = None
+    layers: Annotated[
+        LayerTables,
+        Option(
+            "A further layer: a change of its value costs, as a change of height does; may be "
+            "repeated.",
+            A_LAYER,
+            form="NAME=FILE[:BAND][*WEIGHT]",
+            flags=("--layer",),
+        ),
+    ] = field(default_factory=dict)
+    costs: Annotated[
+        LayerTables,
+        Option(
+            "A cost layer, whose value, above 0, multiplies the length; may be repeated.",
+            A_LAYER,
+            form="NAME=FILE[:BAND][*EXPONENT]",
+            flags=("--cost",),
+        ),
+    ] = field(default_factory=dict)
+    weights: Annotated[
+        Weights,
+        Option(
+            "Map units of travel that a change of one unit of a layer counts as; height is a "
+            "layer, too; may be repeated.",
+            "a table of numbers, NAME = WEIGHT",
+            form="NAME=WEIGHT",
+            flags=("--weight",),
+        ),
+    ] = field(default_factory=dict)
+
 
 # The sections of a scenario file, in its order.
 SECTIONS: Mapping[str, type] = {
@@ -81,3 +223,97 @@ def require_scenario(value: object) -> None:
     """Raise InputError for what is no scenario."""
     if not isinstance(value, Scenario):
         raise InputError(f"scenario={value!r:.60} is none; make one with tp.scenario.load")
+
+
+# From what a user names and asks
+
+# The map is named by itself, and how an answer is printed is the command's matter.
+_NO_KEYWORDS = {"path", "scene", "json", "quiet"}
+
+
+def load(where: str | Path, **given: object) -> Scenario:
+    """A question to Terrapath, ready for ``answer``.
+
+    where : a scenario file (``.toml``), a raster, or the name of a built-in scene.
+    given : options that override the file's. Their names are the keys of a scenario file, but
+    ``planner`` is the planner's name and ``output`` the files of the route: ``start=(0, 0)``,
+    ``planner="optimal"``, ``weights={"height": 10}``, ``max_slope=25``. Paths are relative to the
+    working directory.
+    Raises InputError for an unknown option, with the nearest known one, and for a value of the
+    wrong kind; ScenarioError with the line of a scenario file.
+    """
+    if not isinstance(where, str | Path):
+        raise InputError(
+            f"where={type(where).__name__} is no path; name a scenario file, a raster or a scene, "
+            "or plan on arrays with tp.read_surface, tp.Problem and tp.plan"
+        )
+    return assembled(str(where), _checked(given))
+
+
+def assembled(where: str, given: Given) -> Scenario:
+    """The scenario of a scenario file, a map or a scene, with the given values instead of its own.
+
+    given : checked values by section and key. Raises InputError for a name no file can have.
+    """
+    scenario = _at(where).overridden(given)
+    for file in scenario.files():
+        _require_name(Path(file))
+    return scenario
+
+
+def _require_name(path: Path) -> None:
+    """Raise InputError for a name that no file can have."""
+    try:
+        path.exists()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{str(path)[:60]!r} cannot be a file: {reason}; check the path") from None
+
+
+def _at(where: str) -> Scenario:
+    ending = Path(where).suffix.lower()
+    if ending == ".toml":
+        from .toml import read_scenario
+
+        return read_scenario(where)
+    if not ending:  # names of scenes have none
+        from ..problem.scenes import SCENES
+
+        if where in SCENES:
+            return Scenario(map=MapSection(scene=where))
+    return Scenario(map=MapSection(path=where))
+
+
+def _checked(given: Mapping[str, object]) -> Given:
+    """Keyword arguments as checked values by section and key."""
+    from .checked import WrongValueError, nearest_keyword, validated
+
+    known = {entry.keyword: entry for entry in options() if entry.keyword not in _NO_KEYWORDS}
+    values: dict[str, dict[str, object]] = {}
+    for keyword, value in given.items():
+        if keyword not in known:
+            raise InputError(
+                f"there is no option {keyword!r}; {nearest_keyword(keyword, known.values())}"
+            )
+        entry = known[keyword]
+        several = entry.type == Files and isinstance(value, str | Path)
+        values.setdefault(entry.section, {})[entry.key] = _plain([value] if several else value)
+    try:
+        checked = validated(values)
+    except WrongValueError as mistake:
+        raise InputError(mistake.reason) from None
+    return {
+        section: {key: getattr(getattr(checked, section), key) for key in keys}
+        for section, keys in values.items()
+    }
+
+
+def _plain(value: object) -> object:
+    """A value with paths as text, and arrays and their numbers as Python's own types."""
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {name: _plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple | Iterator):
+        return [_plain(entry) for entry in value]
+    return value.tolist() if hasattr(value, "tolist") else value

@@ -8,14 +8,12 @@ typer reads them to print the help; pydantic is imported when there are values t
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, TypeAlias
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 from .option import (
     A_POINT,
-    NUMBER,
     STRICT,
-    TEXT,
     WHOLE,
     Extent,
     Files,
@@ -29,100 +27,6 @@ from .option import (
     a_switch,
     some_files,
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class LayerTable:
-    """A band of a raster as a layer."""
-
-    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
-
-    file: Annotated[str, a_file("The raster.", '"layer.tif"')]
-    band: Annotated[int, Option("Its band, 1-based.", WHOLE)] = 1
-    weight: Annotated[
-        float,
-        Option(
-            "Of a layer: the map units of travel that a change of one unit counts as. Of a cost: "
-            "the exponent of the multiplier.",
-            NUMBER,
-        ),
-    ] = 1.0
-
-
-LayerTables: TypeAlias = dict[str, LayerTable]
-Weights: TypeAlias = dict[str, float]
-A_LAYER = "a table with file, band and weight"
-
-
-@dataclass(frozen=True, kw_only=True)
-class MapSection:
-    """The ground: a raster with its layers, or a built-in scene."""
-
-    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
-
-    path: Annotated[str | None, a_file("A raster that GDAL can read.", '"dem.tif"')] = None
-    scene: Annotated[
-        str | None, Option("A built-in scene, see `terrapath scenes`.", TEXT, example='"six-peaks"')
-    ] = None
-    height_band: Annotated[
-        int | str | None,
-        Option(
-            "Band of the heights: its number, or the name of a variable [default: 1].",
-            "a whole number, or the name of a variable as text",
-            form="BAND",
-            example="1",
-        ),
-    ] = None
-    fill_holes: Annotated[
-        float,
-        a_number(
-            "Fill holes without data whose longer side is at most this long, map units; larger "
-            "holes stay blocked [default: 0, none].",
-            "SIZE",
-        ),
-    ] = 0.0
-    smooth: Annotated[
-        Extent,
-        Option(
-            "Smooth over this length (standard deviation, map units); auto takes the least that "
-            "heights rounded to a step need [default], none leaves the map as it is.",
-            'a finite number, "auto" or "none"',
-            form="LENGTH|auto|none",
-        ),
-    ] = "auto"
-    crs: Annotated[
-        str | None,
-        Option("CRS of a map that has none, as EPSG:32617.", TEXT, "CRS", (), '"EPSG:32617"'),
-    ] = None
-    layers: Annotated[
-        LayerTables,
-        Option(
-            "A further layer: a change of its value costs, as a change of height does; may be "
-            "repeated.",
-            A_LAYER,
-            form="NAME=FILE[:BAND][*WEIGHT]",
-            flags=("--layer",),
-        ),
-    ] = field(default_factory=dict)
-    costs: Annotated[
-        LayerTables,
-        Option(
-            "A cost layer, whose value, above 0, multiplies the length; may be repeated.",
-            A_LAYER,
-            form="NAME=FILE[:BAND][*EXPONENT]",
-            flags=("--cost",),
-        ),
-    ] = field(default_factory=dict)
-    weights: Annotated[
-        Weights,
-        Option(
-            "Map units of travel that a change of one unit of a layer counts as; height is a "
-            "layer, too; may be repeated.",
-            "a table of numbers, NAME = WEIGHT",
-            form="NAME=WEIGHT",
-            flags=("--weight",),
-        ),
-    ] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -349,6 +253,15 @@ class OutputSection:
             "--output",
         ),
     ] = ()
+    simplify: Annotated[
+        Extent,
+        Option(
+            "How far the route may be from the lines between the points written, map units; auto "
+            "is a tenth of a cell [default], none writes all points. .json has all points.",
+            'a finite number, "auto" or "none"',
+            form="LENGTH|auto|none",
+        ),
+    ] = "auto"
     plot: Annotated[
         str | None,
         a_file("Draw the route on the map: .png, .svg, .pdf or .jpg.", '"route.png"'),

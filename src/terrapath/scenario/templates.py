@@ -21,8 +21,7 @@ from ..surface import Surface
 from .answers import MOST_CELLS
 from .option import Declared, Point, declared
 from .question import require_map
-from .scenario import SECTIONS, options
-from .sections import LayerTable
+from .scenario import SECTIONS, LayerTable, options
 
 # Words that name heights in the description of a band.
 HEIGHT_WORDS = ("height", "elevation", "altitude", "dem", "dtm", "dsm", "topograph")

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.surface.surfaces import Spline, fill_jets, fill_values
+from .._kernels.surface.cells import NO_CELLS
+from .._kernels.surface.points import fill_jets, fill_values
+from .._kernels.surface.surfaces import Spline
 from .._kernels.surface.tridiagonal import solve_curvatures
 from .._support.memory import blocks
 from ..errors import FitError, InputError
@@ -118,7 +120,7 @@ def _spline_of(padded: Array, x: Array, y: Array, weights: Array) -> Spline:
             _to_coefficients(layer[:, columns])
     dx, dy = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
     place = (float(x[0]), float(y[0]), float(dx), float(dy))
-    return Spline(padded, weights, *place, log_cost=np.empty((0, 0, 0)), floor=1.0)
+    return Spline(padded, weights, *place, np.empty((0, 0, 0)), NO_CELLS, floor=1.0)
 
 
 def interpolate(values: Array, x: Array, y: Array, weights: Array) -> Spline:

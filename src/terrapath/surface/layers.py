@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from .._kernels.surface.cells import NO_CELLS, CostCells
 from .._kernels.surface.surfaces import Peaks, Spline
 from ..errors import InputError
 from ..validation import Array, require_choice, require_not_negative
 from .bounds import Bounds
 
-Kind = Literal["rise", "cost"]
+Kind = Literal["rise", "cost", "cells"]
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,9 @@ class Layer:
 
     For a layer of the kind "rise", a change along a path costs. The layer times its weight is a
     coordinate of R^n: a change of one unit counts as ``weight`` map units of travel. For a layer
-    of the kind "cost", the value itself costs: lengths are multiplied by the layer to the power
-    of ``weight``.
+    of the kind "cost" or "cells", the value itself costs: lengths are multiplied by the layer to
+    the power of ``weight``. A layer of the kind "cost" is smooth; one of the kind "cells" is
+    constant in each cell of its raster.
     """
 
     name: str
@@ -34,9 +36,10 @@ class Layer:
 
     def __str__(self) -> str:
         unit = f" [{self.unit}]" if self.unit else ""
-        if self.kind == "cost":
+        if self.kind != "rise":
             power = f" ^ {self.weight:g}" if self.weight != 1.0 else ""
-            return f"cost {self.name}{unit}{power}"
+            cells = " in cells" if self.kind == "cells" else ""
+            return f"cost {self.name}{unit}{power}{cells}"
         weight = f" x {self.weight:g}" if self.weight != 1.0 else ""
         return f"{self.name}{unit}{weight}"
 
@@ -61,28 +64,28 @@ def make_layers(
         raise InputError(f"names={list(names)} repeats a name; layers need distinct names")
     for name, weight, kind in zip(names, weights, kinds, strict=True):
         require_not_negative(**{f"the weight of {name}": weight})
-        require_choice(("rise", "cost"), **{f"the kind of {name}": kind})
+        require_choice(get_args(Kind), **{f"the kind of {name}": kind})
     return tuple(
-        Layer(str(n), str(u), float(w), "cost" if k == "cost" else "rise")
+        Layer(str(n), str(u), float(w), k)  # type: ignore[arg-type] # checked
         for n, u, w, k in zip(names, units, weights, kinds, strict=True)
     )
 
 
-def weights_of(layers: Sequence[Layer]) -> Array:
-    """(layers,): their weights."""
-    return np.array([layer.weight for layer in layers])
+def weights_of(layers: Sequence[Layer], kind: Kind | None = None) -> Array:
+    """(layers,): their weights; of those of a kind alone where it is given."""
+    return np.array([layer.weight for layer in layers if kind in (None, layer.kind)])
 
 
 # Cost layers: their values multiply lengths
 
 
-def require_costs(values: Array, x: Array, y: Array, names: Sequence[str]) -> None:
-    """Raise InputError where a cost (layers, ny, nx) is not above 0, naming the place."""
+def require_costs(values: Array, x: Array, y: Array, name: str) -> None:
+    """Raise InputError where a cost (ny, nx) is not above 0, naming the place."""
     bad = np.argwhere(~(values > 0.0))
     if len(bad):
-        k, j, i = bad[0]
+        j, i = bad[0]
         raise InputError(
-            f"cost {names[k]!r} is {values[k, j, i]:g} at x1={x[i]:.10g}, x2={y[j]:.10g} and not "
+            f"cost {name!r} is {values[j, i]:g} at x1={x[i]:.10g}, x2={y[j]:.10g} and not "
             f"above 0 in {len(bad)} cells; a cost multiplies lengths, so block what is forbidden "
             "and give the rest a cost above 0"
         )
@@ -94,16 +97,30 @@ LARGEST_COST = 1e12
 
 def require_cost_range(data: Peaks | Spline) -> None:
     """Raise InputError where the product of all costs is beyond 1e-12 to 1e12."""
-    logs = data.log_cost if isinstance(data, Spline) else np.empty(0)
-    if not logs.size:
+    if not isinstance(data, Spline):
         return
-    low, high, most = float(logs.min()), float(logs.max()), math.log(LARGEST_COST)
+    ranges = [(float(k.min()), float(k.max())) for k in _logs(data)]
+    low, high = (math.fsum(ends) for ends in zip(*ranges, strict=True)) if ranges else (0.0, 0.0)
+    most = math.log(LARGEST_COST)
     if not -most <= low <= high <= most:
         raise InputError(
             f"the costs, to their weights, reach from 1e{low / math.log(10):.3g} to "
             f"1e{high / math.log(10):.3g}, beyond {1.0 / LARGEST_COST:g} to {LARGEST_COST:g}; "
             "scale them, or lower their weights"
         )
+
+
+def _logs(data: Spline) -> list[Array]:
+    """Logarithms of the smooth cost and of the cells' costs, where there are such."""
+    with np.errstate(divide="ignore"):
+        return [k for k in (data.log_cost, np.log(data.cells.costs)) if k.size]
+
+
+def typical_cost(data: Peaks | Spline) -> float:
+    """The geometric mean of the cost."""
+    if not isinstance(data, Spline):
+        return 1.0
+    return math.exp(math.fsum(float(logs.mean()) for logs in _logs(data)))
 
 
 def _at_knots(coefficients: Array) -> Array:
@@ -128,29 +145,33 @@ def limited(logs: Spline) -> Spline:
     return logs._replace(coefficients=np.clip(logs.coefficients, low, high))
 
 
-def with_costs(data: Spline, logs: Spline | None) -> Spline:
+def with_costs(data: Spline, logs: Spline | None, cells: CostCells = NO_CELLS) -> Spline:
     """A surface's data with its cost: the product of the cost layers, each to its weight."""
     if logs is None:
-        return data
+        return data._replace(cells=cells, floor=cells.least)
     total = np.tensordot(logs.weights, logs.coefficients, axes=1)
     return data._replace(
-        log_cost=np.ascontiguousarray(total[None]), floor=math.exp(float(total.min()))
+        log_cost=np.ascontiguousarray(total[None]),
+        cells=cells,
+        floor=math.exp(float(total.min())) * cells.least,
     )
 
 
 class Span(NamedTuple):
     """Limits that hold for a surface everywhere inside a rectangle."""
 
-    least: float  # the cost is never lower
-    steepest: float  # the slope of the cost on the plane is never larger, 1/map unit
+    least: float  # the smooth cost is never lower
+    steepest: float  # the slope of that cost on the plane is never larger, 1/map unit
     rise: float  # the layers of two points never differ by more, weighted, map units
 
 
 def span_within(data: Spline, bounds: Bounds) -> Span:
     """Limits of the cost and the layers inside a rectangle, from the spline's coefficients."""
-    rows = cells_within(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.log_cost.shape[1])
-    columns = cells_within(bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.log_cost.shape[2])
-    logs, layers = data.log_cost[0, rows, columns], data.coefficients[:, rows, columns]
+    _, ny, nx = data.coefficients.shape
+    rows = cells_within(bounds.x2_min, bounds.x2_max, data.y0, data.dy, ny)
+    columns = cells_within(bounds.x1_min, bounds.x1_max, data.x0, data.dx, nx)
+    layers = data.coefficients[:, rows, columns]
+    logs = data.log_cost[0, rows, columns] if len(data.log_cost) else np.zeros((2, 2))
     slope = math.hypot(
         float(np.abs(np.diff(logs, axis=1)).max()) / data.dx,
         float(np.abs(np.diff(logs, axis=0)).max()) / data.dy,

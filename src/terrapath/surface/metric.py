@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.surface import lengths
-from .._kernels.surface.surfaces import Peaks, fill_metric
+from .._kernels.surface.points import fill_metric
+from .._kernels.surface.surfaces import Peaks
 from ..errors import InputError
 from ..validation import Array, as_points
 from . import Surface

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._kernels.surface.surfaces import Spline, fill_values
+from .._kernels.surface.points import fill_values
+from .._kernels.surface.surfaces import Spline
 from .._support.memory import blocks
 from ..errors import MapError
 from ..validation import Array

@@ -11,23 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.surface.surfaces import Peaks, Spline, fill_jets, fill_log_costs, fill_values
+from .._kernels.surface.points import fill_cell_costs, fill_jets, fill_log_costs, fill_values
+from .._kernels.surface.surfaces import Peaks, Spline
 from .._support.extras import require_packages
 from .._support.memory import blocks
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import Array, as_array, as_points, require_not_negative, require_positive
 from .bounds import Bounds, Mask, as_bounds
+from .costs import CellLayers, cost_cells, cost_values_at, fit_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
-from .layers import (
-    Layer,
-    limited,
-    make_layers,
-    require_cost_range,
-    require_costs,
-    weights_of,
-    with_costs,
-)
+from .layers import Layer, make_layers, require_cost_range, typical_cost, weights_of, with_costs
 
 if TYPE_CHECKING:
     from .smoothing import Smoothing
@@ -107,8 +101,9 @@ class Surface:
     resolution: float  # map units: the size of the smallest features
     nodata: Mask | None = None
     georeference: Georeference | None = None
-    costs: tuple[Layer, ...] = ()  # the layers of the kind "cost"; ``layers`` are the others
-    cost_data: Spline | None = None  # their logarithms, before their weights
+    costs: tuple[Layer, ...] = ()  # the layers of other kinds than "rise"
+    cost_data: Spline | None = None  # the logarithms of the smooth ones, before their weights
+    cost_cells: CellLayers | None = None  # those that are constant in cells
     source: str = ""  # the map that it was read from
 
     def __post_init__(self) -> None:
@@ -178,8 +173,9 @@ class Surface:
         equal, the grid is resampled and the error at the samples reported in ``fit``.
         smoothing : standard deviation, map units, of a Gaussian that the layers are convolved
         with; the change that it makes at the samples is reported in ``fit.smoothing``.
-        kinds : of each layer, "rise" (the default) or "cost". Costs must be above 0; between
-        samples they stay within the range of the samples around.
+        kinds : of each layer, "rise" (the default), "cost" or "cells". Costs must be above 0. One
+        of the kind "cost" is smooth; between samples it stays within the range of the samples
+        around. One of the kind "cells" is constant in the cell around each sample.
         """
         array = np.asarray(values)
         if array.ndim == 2:
@@ -194,9 +190,9 @@ class Surface:
                 raise InputError(f"{name} does not increase; flip it, and the values with it")
         array = as_array(array, "values", shape=(None, len(y), len(x)))
         made = make_layers(len(array), names, units, weights, kinds)
-        is_cost = np.array([layer.kind == "cost" for layer in made])
+        is_rise = np.array([layer.kind == "rise" for layer in made])
         rises = tuple(layer for layer in made if layer.kind == "rise")
-        costs = tuple(layer for layer in made if layer.kind == "cost")
+        costs = tuple(layer for layer in made if layer.kind != "rise")
         if not rises:
             raise InputError(
                 f"all layers are of the kind 'cost' ({', '.join(c.name for c in costs)}); give "
@@ -204,13 +200,8 @@ class Surface:
             )
         bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
         scale = _scale_of(smoothing, bounds)
-        fitted = fit_grid(array[~is_cost] if costs else array, x, y, weights_of(rises), scale)
-        logs = None
-        if costs:
-            require_costs(array[is_cost], x, y, [layer.name for layer in costs])
-            log_values = np.log(array[is_cost])
-            logs = fit_grid(log_values, x, y, weights_of(costs), scale, linear=True).spline
-            logs = limited(logs)
+        fitted = fit_grid(array[is_rise] if costs else array, x, y, weights_of(rises), scale)
+        logs, cells = fit_costs(array, x, y, made, scale)
         fit = Fit(
             f"bicubic spline through {len(x)} x {len(y)} samples",
             fitted.value_error,
@@ -218,8 +209,8 @@ class Surface:
         )
         spacing = float(min(np.diff(x).max(), np.diff(y).max()))
         resolution = spacing if fitted.smoothing is None else fitted.smoothing.resolution(spacing)
-        data = with_costs(fitted.spline, logs)
-        return cls(data, rises, bounds, fit, resolution, nodata, georeference, costs, logs)
+        data = with_costs(fitted.spline, logs, cost_cells(cells, costs))
+        return cls(data, rises, bounds, fit, resolution, nodata, georeference, costs, logs, cells)
 
     @classmethod
     def from_function(
@@ -310,9 +301,10 @@ class Surface:
         )
         data: Peaks | Spline = self.data._replace(weights=weights_of(layers))
         logs = self.cost_data
-        if logs is not None and isinstance(data, Spline):
-            logs = logs._replace(weights=weights_of(costs))
-            data = with_costs(data, logs)
+        if logs is not None:
+            logs = logs._replace(weights=weights_of(costs, "cost"))
+        if isinstance(data, Spline):
+            data = with_costs(data, logs, cost_cells(self.cost_cells, costs))
         return replace(self, data=data, layers=layers, costs=costs, cost_data=logs)
 
     # Values and derivatives
@@ -354,11 +346,22 @@ class Surface:
         return self._jets(points)[..., [[3, 4], [4, 5]]]
 
     def cost(self, points: npt.ArrayLike) -> Array:
-        """Points (..., 2), map units -> (...): the cost, which multiplies lengths there."""
-        return np.asarray(np.exp(self.log_cost_jets(points)[..., 0]))
+        """Points (..., 2), map units -> (...): the cost, which multiplies lengths there.
+
+        On a side between cells of a cost raster it is the lower one.
+        """
+        smooth = np.exp(self.log_cost_jets(points)[..., 0])
+        if self.cost_cells is None:
+            return np.asarray(smooth)
+        flat, _ = self._points(points)
+        fill_cell_costs(self.data, flat, costs := np.empty(len(flat)))
+        return np.asarray(smooth * costs.reshape(smooth.shape))
 
     def log_cost_jets(self, points: npt.ArrayLike) -> Array:
-        """Points (..., 2) -> (..., 6): log of the cost, d/dx1, d/dx2, and second derivatives."""
+        """Points (..., 2) -> (..., 6): log of the smooth cost, and its derivatives.
+
+        These are d/dx1, d/dx2 and the second derivatives.
+        """
         flat, shape = self._points(points)
         jets = np.zeros((len(flat), 6))
         if self.cost_data is not None:
@@ -368,10 +371,8 @@ class Surface:
     def cost_values(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2) -> (..., costs): the value of each cost layer, without its weight."""
         flat, shape = self._points(points)
-        logs = np.empty((len(flat), len(self.costs)))
-        if self.cost_data is not None:
-            fill_values(self.cost_data, flat, logs)
-        return np.asarray(np.exp(logs).reshape(*shape, len(self.costs)))
+        values = cost_values_at(self.data, self.costs, self.cost_data, self.cost_cells, flat)
+        return values.reshape(*shape, len(self.costs))
 
     @property
     def least_cost(self) -> float:
@@ -381,8 +382,7 @@ class Surface:
     @cached_property
     def typical_cost(self) -> float:
         """The geometric mean of the cost."""
-        logs = self.data.log_cost if isinstance(self.data, Spline) else np.empty(0)
-        return math.exp(float(logs.mean())) if logs.size else 1.0
+        return typical_cost(self.data)
 
     def lift(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2) -> (..., n): the points of R^n above them, layers weighted."""

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from ..compiler import inner_kernel, kernel
 from ..dispatch import per_class
+from ..surface.cells import any_cells, least_inside
 from ..surface.surfaces import Peaks, Spline
 from .taylor import (
     Model,
@@ -221,6 +222,9 @@ def peaks_times_squared_cost(surface, box, f):
 
 @kernel
 def spline_times_squared_cost(surface, box, f):
+    if any_cells(surface.cells):
+        x0, x1, y0, y1 = box.x - box.a, box.x + box.a, box.y - box.b, box.y + box.b
+        f = times_number(f, least_inside(surface.cells, x0, x1, y0, y1) ** 2)
     if surface.log_cost.shape[0] == 0:
         return f
     log_cost = spline_over(surface, surface.log_cost[0], box).value
@@ -229,7 +233,10 @@ def spline_times_squared_cost(surface, box, f):
 
 @per_class({Peaks: peaks_times_squared_cost, Spline: spline_times_squared_cost})
 def times_squared_cost(surface, box, f):
-    """The model of c^2 f over a box, which must lie within one knot span of a spline."""
+    """The model of c^2 f over a box, which must lie within one knot span of a spline.
+
+    Where costs are constant in cells, c is the lowest of the cells that hold a part of the box.
+    """
 
 
 # Pieces of a cell on which the surface is smooth

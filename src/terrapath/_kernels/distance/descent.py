@@ -15,9 +15,16 @@ import numpy as np
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import Grid, segment_is_free
 from ..surface.lengths import inverse
-from ..surface.surfaces import floor_of, metric_at, slope_at as surface_slope_at, spot_at
+from ..surface.surfaces import (
+    cell_range,
+    floor_of,
+    has_cells,
+    metric_at,
+    slope_at as surface_slope_at,
+    spot_at,
+)
 from .cubic import first_node, interpolate
-from .surface_ray import surface_ray
+from .ground import surface_ray
 
 
 class Field(NamedTuple):
@@ -92,12 +99,25 @@ def sees_cell(space, grid, x, y):
     return True
 
 
+@inner_kernel
+def cell_costs_differ(surface, grid, x, y):
+    """Do costs that are constant in cells differ between the 16 nodes of the cubic at (x, y)?"""
+    if not has_cells(surface):
+        return False
+    x0 = grid.x0 + first_node((x - grid.x0) / grid.dx, grid.nx) * grid.dx
+    y0 = grid.y0 + first_node((y - grid.y0) / grid.dy, grid.ny) * grid.dy
+    costs = cell_range(surface, x0, x0 + 3.0 * grid.dx, y0, y0 + 3.0 * grid.dy)
+    return costs.low < costs.high
+
+
 @kernel
 def slope_at(surface, space, field, x, y):
     """The field at (x, y), where it is smooth there."""
     grid = field.grid
     s, t = (x - grid.x0) / grid.dx, (y - grid.y0) / grid.dy
     if min(grid.nx, grid.ny) < 4 or not (0.0 <= s <= grid.nx - 1 and 0.0 <= t <= grid.ny - 1):
+        return ROUGH_PLACE
+    if cell_costs_differ(surface, grid, x, y):
         return ROUGH_PLACE
     patch = interpolate(field.tau, s, t)
     if patch.value == math.inf or (field.has_obstacles and not sees_cell(space, grid, x, y)):

@@ -7,8 +7,8 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
-from ..surface.lengths import composite_boole, norm, segment_length
-from ..surface.surfaces import Metric, plus_layer, slope_at, spot_at, times_cost
+from ..surface.lengths import composite_boole, length_in_cells, norm, segment_length
+from ..surface.surfaces import Metric, has_cells, plus_layer, slope_at, spot_at, times_cost
 from .buckets import Buckets
 
 # Places in Tree.counters.
@@ -127,8 +127,10 @@ def survey(surface, graph, new, x, y):
 
 @kernel
 def edge_length(surface, graph, a, b, panel):
-    """Length of the edge between two vertices by Line-R, in panels."""
+    """Length of the edge between two vertices by Line-R, in panels, or cell by cell."""
     p, q = graph.places[a], graph.places[b]
+    if has_cells(surface):
+        return length_in_cells(surface, p[X], p[Y], q[X], q[Y])
     dx, dy = q[X] - p[X], q[Y] - p[Y]
     panels = max(math.ceil(math.sqrt(dx * dx + dy * dy) / panel), 1)
     dx, dy = dx / panels, dy / panels

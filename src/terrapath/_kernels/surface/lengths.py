@@ -6,7 +6,11 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..vec4 import four, four_in_row, sqrt, total
-from .surfaces import Metric, floor_of, speed_at, speeds_along, speeds_inside, spot_at, value_at
+from .speeds import speed_at, speeds_along, speeds_inside
+from .surfaces import Metric, floor_of, has_cells, spot_at, stretch_at, value_at
+
+# Where Gauss' rule has its first node.
+_NEAR = 0.5 - 0.5 * math.sqrt(0.6)
 
 
 @inner_kernel
@@ -40,8 +44,35 @@ def composite_boole(surface, ax, ay, dx, dy, ends, panels):
 
 
 @inner_kernel
+def gauss(surface, x, y, vx, vy):
+    """The integral of |v|_h, with the smooth cost, from (x, y) to (x, y) + v by three points."""
+    ends = speed_at(surface, x + _NEAR * vx, y + _NEAR * vy, vx, vy)
+    ends += speed_at(surface, x + (1.0 - _NEAR) * vx, y + (1.0 - _NEAR) * vy, vx, vy)
+    return (5.0 * ends + 8.0 * speed_at(surface, x + 0.5 * vx, y + 0.5 * vy, vx, vy)) / 18.0
+
+
+@kernel
+def length_in_cells(surface, ax, ay, bx, by):
+    """Length of the segment a-b where costs are constant in cells: three points in each cell."""
+    dx, dy = bx - ax, by - ay
+    length, share = 0.0, 0.0
+    while share < 1.0:
+        here = stretch_at(surface, ax, ay, dx, dy, share)
+        part = here.end - share
+        x, y = ax + share * dx, ay + share * dy
+        length += here.cost * gauss(surface, x, y, part * dx, part * dy)
+        share = here.end
+    return length
+
+
+@inner_kernel
 def line_r(surface, ax, ay, bx, by):
-    """Length of the segment a-b under h by the 5-point Newton-Cotes rule (Algorithm 1)."""
+    """Length of the segment a-b under h by the 5-point Newton-Cotes rule (Algorithm 1).
+
+    Where costs are constant in cells, by a rule of three points in each cell.
+    """
+    if has_cells(surface):
+        return length_in_cells(surface, ax, ay, bx, by)
     dx, dy = bx - ax, by - ay
     ends = speed_at(surface, ax, ay, dx, dy) + speed_at(surface, bx, by, dx, dy)
     return composite_boole(surface, ax, ay, dx, dy, ends, 1)
@@ -150,8 +181,8 @@ def piece_length(surface, x, y, vx, vy, tolerance):
 
 
 @kernel
-def segment_length(surface, ax, ay, bx, by, longest, tolerance):
-    """True length of the segment a-b under h.
+def smooth_length(surface, ax, ay, bx, by, longest, tolerance):
+    """True length of the segment a-b under h, with the smooth cost.
 
     It is cut into pieces of at most ``longest`` on the plane. That must be only a few times the
     size of the surface's features, so that the nodes of the first rule miss none of them.
@@ -161,6 +192,21 @@ def segment_length(surface, ax, ay, bx, by, longest, tolerance):
     length = 0.0
     for k in range(pieces):
         length += piece_length(surface, ax + k * dx, ay + k * dy, dx, dy, tolerance)
+    return length
+
+
+@kernel
+def segment_length(surface, ax, ay, bx, by, longest, tolerance):
+    """True length of the segment a-b under h; see ``smooth_length``, which measures each cell."""
+    if not has_cells(surface):
+        return smooth_length(surface, ax, ay, bx, by, longest, tolerance)
+    dx, dy = bx - ax, by - ay
+    length, share = 0.0, 0.0
+    while share < 1.0:
+        here = stretch_at(surface, ax, ay, dx, dy, share)
+        x0, y0, x1, y1 = ax + share * dx, ay + share * dy, ax + here.end * dx, ay + here.end * dy
+        length += here.cost * smooth_length(surface, x0, y0, x1, y1, longest, tolerance)
+        share = here.end
     return length
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..compiler import allocating_kernel, kernel
 from ..dispatch import per_class
 from .bsplines import basis, basis_slope
+from .cells import any_cells, cost_in_cells
 from .surfaces import Peaks, Spline, spline_cell
 
 # Indices into the arrays of a row.
@@ -128,6 +129,17 @@ def multiply_by_cost(columns, row):
 
 
 @kernel
+def multiply_by_cells(surface, grid, j, row):
+    """Multiply the metric of a row by c^2 of the cells."""
+    y = grid.y0 + j * grid.dy
+    for i in range(row.shape[1]):
+        c = cost_in_cells(surface.cells, grid.x0 + i * grid.dx, y)
+        row[H11, i] *= c * c
+        row[H12, i] *= c * c
+        row[H22, i] *= c * c
+
+
+@kernel
 def fill_spline_row(surface, grid, j, columns, row):
     cell = spline_cell(surface, surface.x0, grid.y0 + j * grid.dy)
     by, sy = basis(cell.v), basis_slope(cell.v)
@@ -141,6 +153,8 @@ def fill_spline_row(surface, grid, j, columns, row):
     if surface.log_cost.shape[0] > 0:
         sum_columns(surface.log_cost[0], cell.j, by, columns[9])
         multiply_by_cost(columns, row)
+    if any_cells(surface.cells):
+        multiply_by_cells(surface, grid, j, row)
 
 
 @kernel
@@ -192,7 +206,7 @@ def fill_height_row(surface, grid, j, columns, layer, heights):
 
 @per_class({Peaks: fill_peaks_costs, Spline: fill_spline_costs})
 def fill_cost_row(surface, grid, j, columns, costs):
-    """The costs at the nodes of row j: costs (nx,)."""
+    """The smooth costs at the nodes of row j: costs (nx,)."""
 
 
 @kernel

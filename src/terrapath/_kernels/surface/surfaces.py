@@ -2,7 +2,10 @@
 
 A surface s(x1, x2) = (x1, x2, w_3 x_3, ..., w_n x_n) is the graph of n - 2 layers
 over the plane. ``Peaks`` is exact; ``Spline`` is for everything else. On a ``Spline`` lengths
-may be multiplied by a cost c(x1, x2) > 0. The logarithm of c is a spline, so c stays above 0.
+may be multiplied by a cost c(x1, x2) > 0: by a smooth one, whose logarithm is a spline, so that it
+stays above 0; by one that is constant in cells (``cells.py``); or by both. Here ``speed_at`` and
+all that is said of a point, but for ``metric_at``, know the smooth cost only. ``lengths.py``
+multiplies by the other, cell by cell.
 """
 
 import math
@@ -12,8 +15,18 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..dispatch import per_class
-from ..vec4 import exp, four, fused, sqrt, total
+from ..vec4 import exp, fused, total
 from .bsplines import Cell, basis, basis_curvature, basis_slope, column_sums, tensor_sum
+from .cells import (
+    CostCells,
+    Range,
+    Stretch,
+    any_cells,
+    cost_in_cells,
+    mean_in_cells,
+    range_in_box,
+    stretch,
+)
 
 
 class Peaks(NamedTuple):
@@ -33,7 +46,8 @@ class Spline(NamedTuple):
     y0: float
     dx: float  # knot spacing
     dy: float
-    log_cost: np.ndarray  # (0 or 1, ny + 2, nx + 2) float64: log c as one more layer
+    log_cost: np.ndarray  # (0 or 1, ny + 2, nx + 2) float64: log of the smooth c as one more layer
+    cells: CostCells  # the c that is constant in cells
     floor: float  # a lower bound on c; 1 without a cost
 
 
@@ -216,6 +230,56 @@ def spline_log_cost(surface, x, y):
 
 
 @inner_kernel
+def peaks_has_cells(surface):
+    return False
+
+
+@inner_kernel
+def spline_has_cells(surface):
+    return any_cells(surface.cells)
+
+
+@inner_kernel
+def peaks_cell_cost(surface, x, y):
+    return 1.0
+
+
+@inner_kernel
+def spline_cell_cost(surface, x, y):
+    return cost_in_cells(surface.cells, x, y)
+
+
+@inner_kernel
+def peaks_stretch(surface, ax, ay, dx, dy, share):
+    return Stretch(1.0, 1.0)
+
+
+@inner_kernel
+def spline_stretch(surface, ax, ay, dx, dy, share):
+    return stretch(surface.cells, ax, ay, dx, dy, share)
+
+
+@inner_kernel
+def peaks_mean_cell_cost(surface, ax, ay, bx, by):
+    return 1.0
+
+
+@inner_kernel
+def spline_mean_cell_cost(surface, ax, ay, bx, by):
+    return mean_in_cells(surface.cells, ax, ay, bx, by)
+
+
+@inner_kernel
+def peaks_cell_range(surface, x0, x1, y0, y1):
+    return Range(1.0, 1.0)
+
+
+@inner_kernel
+def spline_cell_range(surface, x0, x1, y0, y1):
+    return range_in_box(surface.cells, x0, x1, y0, y1)
+
+
+@inner_kernel
 def peaks_floor(surface):
     return 1.0
 
@@ -250,12 +314,37 @@ def slope_along(surface, layer, spot, vx, vy):
 
 @per_class({Peaks: peaks_squared_cost, Spline: spline_squared_cost})
 def squared_cost_at(surface, spot):
-    """c^2; 1 without a cost."""
+    """The square of the smooth cost; 1 without one."""
 
 
 @per_class({Peaks: peaks_log_cost, Spline: spline_log_cost})
 def log_cost_at(surface, x, y):
-    """The jet of log c."""
+    """The jet of the logarithm of the smooth cost."""
+
+
+@per_class({Peaks: peaks_has_cells, Spline: spline_has_cells})
+def has_cells(surface):
+    """Is there a cost that is constant in cells?"""
+
+
+@per_class({Peaks: peaks_cell_cost, Spline: spline_cell_cost})
+def cell_cost_at(surface, x, y):
+    """The cost of the cell at a point, on a side the lowest; 1 without cells."""
+
+
+@per_class({Peaks: peaks_stretch, Spline: spline_stretch})
+def stretch_at(surface, ax, ay, dx, dy, share):
+    """The stretch in one cell of the segment from a to a + d that begins at a share of it."""
+
+
+@per_class({Peaks: peaks_mean_cell_cost, Spline: spline_mean_cell_cost})
+def mean_cell_cost(surface, ax, ay, bx, by):
+    """The mean of the cells' cost along the segment a-b, by length on the plane."""
+
+
+@per_class({Peaks: peaks_cell_range, Spline: spline_cell_range})
+def cell_range(surface, x0, x1, y0, y1):
+    """The lowest and the highest cost of the cells that hold or touch a closed box."""
 
 
 @per_class({Peaks: peaks_floor, Spline: spline_floor})
@@ -291,76 +380,11 @@ def metric_at(surface, x, y):
     h = Metric(none + 1.0, none, none + 1.0)
     for layer in range(surface.weights.shape[0]):
         h = plus_layer(h, surface.weights[layer], slope_at(surface, layer, spot))
-    return times_cost(surface, spot, h)
-
-
-@inner_kernel
-def speed_at(surface, x, y, vx, vy):
-    """|v|_h for v = (vx, vy): c (|v|^2 + sum_k (w_k dx_k(v))^2)^1/2.
-
-    On ``Peaks`` also at four points at once.
-    """
-    spot = spot_at(surface, x, y)
-    squared = 0.0 * x + (vx * vx + vy * vy)  # a number or four
-    for layer in range(surface.weights.shape[0]):
-        rise = surface.weights[layer] * slope_along(surface, layer, spot, vx, vy)
-        squared = squared + rise * rise
-    return sqrt(squared_cost_at(surface, spot) * squared)
-
-
-@inner_kernel
-def peaks_speeds_along(surface, x, y, vx, vy, shares):
-    return speed_at(surface, fused(shares, vx, x), fused(shares, vy, y), vx, vy)
-
-
-@inner_kernel
-def spline_speeds_along(surface, x, y, vx, vy, shares):
-    return four(
-        speed_at(surface, x + shares[0] * vx, y + shares[0] * vy, vx, vy),
-        speed_at(surface, x + shares[1] * vx, y + shares[1] * vy, vx, vy),
-        speed_at(surface, x + shares[2] * vx, y + shares[2] * vy, vx, vy),
-        speed_at(surface, x + shares[3] * vx, y + shares[3] * vy, vx, vy),
-    )
-
-
-@per_class({Peaks: peaks_speeds_along, Spline: spline_speeds_along})
-def speeds_along(surface, x, y, vx, vy, shares):
-    """|v|_h at four points of the segment from (x, y) to (x, y) + v, given as shares of it."""
-
-
-@inner_kernel
-def peaks_speeds_inside(surface, x, y, vx, vy):
-    return peaks_speeds_along(surface, x, y, vx, vy, four(0.25, 0.5, 0.75, 1.0))
-
-
-@inner_kernel
-def spline_speeds_inside(surface, x, y, vx, vy):
-    return four(
-        speed_at(surface, x + 0.25 * vx, y + 0.25 * vy, vx, vy),
-        speed_at(surface, x + 0.5 * vx, y + 0.5 * vy, vx, vy),
-        speed_at(surface, x + 0.75 * vx, y + 0.75 * vy, vx, vy),
-        0.0,
-    )
-
-
-@per_class({Peaks: peaks_speeds_inside, Spline: spline_speeds_inside})
-def speeds_inside(surface, x, y, vx, vy):
-    """|v|_h at a quarter, a half and three quarters of the segment from (x, y) to (x, y) + v.
-
-    Four numbers are returned; ignore the last one.
-    """
-
-
-# Many points at once: points (m, 2); results are filled in
-
-
-@kernel
-def fill_values(surface, points, values):
-    """Values (m, layers)."""
-    for m in range(points.shape[0]):
-        spot = spot_at(surface, points[m, 0], points[m, 1])
-        for layer in range(surface.weights.shape[0]):
-            values[m, layer] = value_at(surface, layer, spot)
+    h = times_cost(surface, spot, h)
+    if not has_cells(surface):
+        return h
+    c = cell_cost_at(surface, x, y)
+    return Metric(c * c * h.h11, c * c * h.h12, c * c * h.h22)
 
 
 @inner_kernel
@@ -368,29 +392,3 @@ def put_jet(row, jet):
     """Write a jet into a row (6,)."""
     row[0], row[1], row[2] = jet.f, jet.fx, jet.fy
     row[3], row[4], row[5] = jet.fxx, jet.fxy, jet.fyy
-
-
-@kernel
-def fill_jets(surface, points, jets):
-    """Jets (m, layers, 6)."""
-    for m in range(points.shape[0]):
-        for layer in range(surface.weights.shape[0]):
-            put_jet(jets[m, layer], jet_at(surface, layer, points[m, 0], points[m, 1]))
-
-
-@kernel
-def fill_log_costs(surface, points, jets):
-    """Jets (m, 6) of log c."""
-    for m in range(points.shape[0]):
-        put_jet(jets[m], log_cost_at(surface, points[m, 0], points[m, 1]))
-
-
-@kernel
-def fill_metric(surface, points, tensors):
-    """Metric tensors (m, 2, 2)."""
-    for m in range(points.shape[0]):
-        h = metric_at(surface, points[m, 0], points[m, 1])
-        tensors[m, 0, 0] = h.h11
-        tensors[m, 0, 1] = h.h12
-        tensors[m, 1, 0] = h.h12
-        tensors[m, 1, 1] = h.h22

@@ -13,6 +13,7 @@ from ...errors import InputError, UnfinishedWarning, tell
 from ...problem import Path, Problem
 from ...surface import Surface
 from ...validation import Array, as_array, require_positive
+from ..cell_routes import polished
 from .curve import curve_through
 from .newton import correct, placed_parameters, shortest_polyline
 
@@ -51,7 +52,8 @@ def refine(
     are enough. The path bends round obstacles at a distance of 1e-8 of the region's side, however
     near to them the path given passes. It is never longer than the path given, stays in free
     space, and passes each obstacle on the same side. Where obstacles leave no room to pull the
-    path taut, it is returned as it was, with an UnfinishedWarning. time_limit : seconds.
+    path taut, it is returned as it was, with an UnfinishedWarning. Where costs are constant in
+    cells, its bends move along the sides of cells to where it is shortest. time_limit : seconds.
     must_stop : is asked many times a second whether to stop; from then on it must say True. Where
     time is up, or it says so, the path is the best one so far.
     Raises InputError where the path does not join start and goal, or is not in free space.
@@ -61,6 +63,8 @@ def refine(
         require_positive(time_limit=time_limit)
         must_stop = stop_after(time_limit, must_stop)
     given = problem.path(_checked(problem, path))
+    if problem.surface.cost_cells is not None:
+        return polished(problem, given, must_stop)
     best, is_pulled = given, given.length == 0.0
     for points in _refined(problem, given, tolerance, must_stop):
         if not problem.allows(points):

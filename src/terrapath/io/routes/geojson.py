@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ...problem import Solution
+from ...problem import Path as PlannedPath
 from ...surface import Surface
+from ...surface.ground import height_layer
 from ...validation import Array
 from .places import DECIMALS, Part, in_degrees, parts_in_degrees
+from .profile import heights
 from .record import dump, summary
+from .route import Route
 
 
 def _frame(surface: Surface) -> str:
@@ -23,17 +26,17 @@ def _frame(surface: Surface) -> str:
     return f"longitude and latitude, {body}"
 
 
-def _line(parts: list[Part], surface: Surface) -> tuple[dict[str, Any], list[Any]]:
+def _line(parts: list[Part], path: PlannedPath) -> tuple[dict[str, Any], list[Any]]:
     """The geometry, and heights in the same order and nesting.
 
     Heights are not third coordinates. Those would be metres above the ellipsoid, but the heights
     of a map are above sea level, or above what the map defines.
     """
     lines = [part.lonlat.tolist() for part in parts]
-    heights = [surface.values(part.points)[:, 0].tolist() for part in parts]
+    found = [heights(path, part.points).tolist() for part in parts]
     if len(parts) == 1:
-        return {"type": "LineString", "coordinates": lines[0]}, heights[0]
-    return {"type": "MultiLineString", "coordinates": lines}, heights
+        return {"type": "LineString", "coordinates": lines[0]}, found[0]
+    return {"type": "MultiLineString", "coordinates": lines}, found
 
 
 def _vias(points: Array, places: Array) -> list[dict[str, Any]]:
@@ -48,23 +51,23 @@ def _vias(points: Array, places: Array) -> list[dict[str, Any]]:
     ]
 
 
-def write(solution: Solution, file: Path) -> None:
+def write(route: Route, file: Path) -> None:
     """A collection: the route, and its via points where there are any."""
-    assert solution.path is not None
-    surface, points, via = solution.problem.surface, solution.path.points, solution.via
-    reference, height = surface.georeference, surface.layers[0]
+    path, points, via = route.path, route.points, route.solution.via
+    reference = path.surface.georeference
     if reference is None:
         parts, via_places = [Part(points, points)], via
     else:
         parts = parts_in_degrees(reference, points)
         via_places = np.round(in_degrees(reference, via), DECIMALS)
-    geometry, heights = _line(parts, surface)
+    geometry, along = _line(parts, path)
+    has_height = height_layer(path.surface) is not None
     properties = {
-        **summary(solution),
-        "coordinates": _frame(surface),
-        "heights": heights,
-        "height_unit": height.unit,
+        **summary(route),
+        "coordinates": _frame(path.surface),
+        "heights": along if has_height else None,
+        "height_unit": path.ground_unit if has_height else None,
     }
-    route = {"type": "Feature", "geometry": geometry, "properties": properties}
-    collection = {"type": "FeatureCollection", "features": [route, *_vias(via, via_places)]}
+    line = {"type": "Feature", "geometry": geometry, "properties": properties}
+    collection = {"type": "FeatureCollection", "features": [line, *_vias(via, via_places)]}
     file.write_text(dump(collection), encoding="utf-8")

@@ -6,16 +6,13 @@ import sqlite3
 import tempfile
 from contextlib import closing
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from ...errors import silence
-from ...problem import Solution
-from ...surface.georeference import Georeference
+from .features import Features, Values, crs_text, write_features
 from .profile import clean, distinct, profile_columns
 from .record import dump, summary
+from .route import Route
 
 # GDAL writes the current date into a file, but the same route should give the same bytes.
 EPOCH = "1970-01-01T00:00:00.000Z"
@@ -24,93 +21,48 @@ PLAIN = {"SPATIAL_INDEX": "NO"}
 # Column names that GDAL uses itself.
 RESERVED = ("fid", "geom")
 
-Values = npt.NDArray[Any]
 
-
-class Layer(NamedTuple):
-    """Geometries of one kind, and columns of values, one for each geometry."""
-
-    kind: str
-    geometries: Values
-    columns: dict[str, Values]
-
-
-def _attributes(solution: Solution) -> dict[str, Values]:
+def _attributes(route: Route) -> dict[str, Values]:
     """One row of attributes; a list or a dict becomes JSON text."""
     columns = {}
-    for key, value in summary(solution).items():
+    for key, value in summary(route).items():
         if isinstance(value, dict | list):
             columns[key] = np.array([dump(value).strip()], object)
         elif isinstance(value, str):
             columns[key] = np.array([clean(value)], object)
-        elif key in {"seed", "samples"}:
+        elif key in {"seed", "samples", "points", "points_planned"}:
             columns[key] = np.ma.array([value or 0], np.int64, mask=[value is None])
         else:
             columns[key] = np.array([np.nan if value is None else value])
     return columns
 
 
-def _layers(solution: Solution) -> dict[str, Layer]:
+def _layers(route: Route) -> dict[str, Features]:
     """The layers of the file, by their names."""
     import shapely
 
-    path = solution.path
-    assert path is not None
-    columns = profile_columns(solution)
+    solution, columns = route.solution, profile_columns(route)
     names = distinct([column.heading for column in columns], RESERVED)
     data = {name: column.values for name, column in zip(names, columns, strict=True)}
     roles = np.array(["start", *["via"] * len(solution.via), "goal"], object)
-    places = shapely.points(path.profile.points)
+    line = np.array([shapely.LineString(route.points)])
     return {
-        "route": Layer("LineString", np.array([path.line]), _attributes(solution)),
-        "points": Layer("Point", places, data),
-        "waypoints": Layer("Point", shapely.points(solution.stops), {"role": roles}),
+        "route": Features("LineString", line, _attributes(route)),
+        "points": Features("Point", shapely.points(route.points), data),
+        "waypoints": Features("Point", shapely.points(solution.stops), {"role": roles}),
     }
 
 
-def _crs(reference: Georeference | None) -> str | None:
-    """The CRS as GDAL writes it: as its EPSG code where it has one."""
-    if reference is None:
-        return None
-    code = reference.crs.to_epsg()
-    return f"EPSG:{code}" if code else reference.crs.to_wkt("WKT1_GDAL")
-
-
-def _write_layer(file: Path, name: str, layer: Layer, crs: str | None) -> None:
-    import pyogrio.raw
-    import shapely
-
-    columns = layer.columns.values()
-    silence(UserWarning, __name__)  # it warns where the plane has no CRS; that is allowed
-    pyogrio.raw.write(
-        file,
-        shapely.to_wkb(layer.geometries),
-        [np.ma.getdata(values) for values in columns],
-        list(layer.columns),
-        [np.ma.getmaskarray(v) if np.ma.isMaskedArray(v) else None for v in columns],
-        layer=name,
-        driver="GPKG",
-        geometry_type=layer.kind,
-        crs=crs,
-        layer_options=PLAIN,
-    )
-
-
-def write(solution: Solution, file: Path) -> None:
+def write(route: Route, file: Path) -> None:
     """Write the layers ``route``, ``points`` (the profile) and ``waypoints`` (start, via, goal).
 
     The file is first made in a temporary folder, because SQLite keeps journals beside its files.
     """
-    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
-
-    layers, crs = _layers(solution), _crs(solution.problem.surface.georeference)
+    layers, crs = _layers(route), crs_text(route.path.surface.georeference)
     with tempfile.TemporaryDirectory(prefix="terrapath-") as folder:
         draft, whole = Path(folder) / "route.gpkg", Path(folder) / "whole.gpkg"
-        try:
-            for name, layer in layers.items():
-                _write_layer(draft, name, layer, crs)
-        except (DataLayerError, DataSourceError, FeatureError) as error:
-            raise OSError(str(error).split("\n")[0]) from error
+        for name, layer in layers.items():
+            write_features(draft, layer, layer=name, driver="GPKG", crs=crs, **PLAIN)
         try:
             with closing(sqlite3.connect(draft)) as database:
                 _require_whole(database, {n: len(layer.geometries) for n, layer in layers.items()})

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import MapError
 from ...surface.georeference import Georeference
+from ...surface.ground import plane_metres
 from ...validation import Array
-from .units import plane_metres
 
 # Decimals of a degree: a tenth of a millimetre on Earth.
 DECIMALS = 9
@@ -24,6 +25,18 @@ class Part(NamedTuple):
 
     lonlat: Array  # (m, 2), degrees, longitude in [-180, 180]
     points: Array  # (m, 2), the same places on the plane, map units
+
+
+def require_earth(path: Path, georeference: Georeference | None) -> None:
+    """Raise MapError where the plane has no WGS 84 coordinates: GPX and KML allow no others."""
+    if georeference is not None and georeference.is_earth:
+        return
+    where = "the map has no CRS" if georeference is None else f"{georeference.name} is not on Earth"
+    kind = path.suffix[1:].upper()
+    raise MapError(
+        f"output={str(path)!r} cannot be written: {kind} holds places on Earth, and {where}; "
+        "write .geojson, .gpkg or .csv instead"
+    )
 
 
 def in_degrees(reference: Georeference, points: Array) -> Array:

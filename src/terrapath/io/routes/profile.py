@@ -1,4 +1,4 @@
-"""The profile of a route as columns: distance, place, height, slopes and further layers."""
+"""The profile of a route as columns: distance, value, place, height, slopes, further layers."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...problem import Path, Solution
+from ...problem import Path
+from ...surface.ground import height_layer
 from ...validation import Array
 from .places import in_degrees
-from .units import height_scale
+from .route import Route
 
 
 class Column(NamedTuple):
@@ -39,47 +40,63 @@ def headings(points: Array) -> Array:
 
 
 class Slopes(NamedTuple):
-    """Slopes of the first layer at the points of a profile, degrees."""
+    """Slopes of the ground at the points of a profile, degrees."""
 
     along: Array  # (m,) in the direction of travel, positive uphill
     ground: Array  # (m,) of the ground in its steepest direction
+    side: Array  # (m,) across the direction of travel, positive where the left is higher
 
 
 def slopes(path: Path) -> Slopes:
     """Slopes along a path. Where a unit is not known, height and plane are taken to share one."""
-    points = path.profile.points
-    gradients = height_scale(path.surface) * path.surface.gradients(points)[:, 0]
-    along = (gradients * headings(points)).sum(axis=1)
-    return Slopes(*np.degrees(np.arctan([along, np.hypot(*gradients.T)])))
+    points, ground = path.profile.points, path.ground
+    gradients = ground.height_scale * ground.surface.gradients(points)[:, 0]
+    ahead = headings(points)
+    along = (gradients * ahead).sum(axis=1)
+    side = ahead[:, 0] * gradients[:, 1] - ahead[:, 1] * gradients[:, 0]
+    return Slopes(*np.degrees(np.arctan([along, np.hypot(*gradients.T), side])))
 
 
-def profile_columns(solution: Solution) -> list[Column]:
-    """Distance, place, height, slopes and every further layer."""
-    path, surface = solution.path, solution.problem.surface
-    assert path is not None
+def heights(path: Path, points: Array) -> Array:
+    """(m,): heights of points in the path's ground unit; 0 where no layer is the height."""
+    ground = path.ground
+    scale = ground.metres * ground.height_scale
+    return np.asarray(scale * ground.surface.values(points)[:, 0])
+
+
+def profile_columns(route: Route) -> list[Column]:
+    """Distance, value, place, height, slopes and every further layer, at the points written."""
+    path, surface, unit = route.path, route.path.surface, route.path.ground_unit
     profile, slope = path.profile, slopes(path)
     columns = [
-        Column("distance", "", profile.distance),
+        Column("distance", unit, profile.distance),
+        Column("value", route.solution.unit, profile.value),
         Column("x", "", profile.points[:, 0]),
         Column("y", "", profile.points[:, 1]),
     ]
     if surface.georeference is not None:
         longitude, latitude = in_degrees(surface.georeference, profile.points).T
         columns += [Column("longitude", "", longitude), Column("latitude", "", latitude)]
-    height = Column(surface.layers[0].name, surface.layers[0].unit, profile.values[:, 0])
-    steepness = [
-        Column("slope", "degrees", slope.along),
-        Column("ground slope", "degrees", slope.ground),
-    ]
-    return [*columns, height, *steepness, *further_layers(path)]
+    if (k := height_layer(surface)) is not None:
+        name = surface.layers[k].name
+        columns += [
+            Column(name, unit, heights(path, profile.points)),
+            Column("slope", "degrees", slope.along),
+            Column("ground slope", "degrees", slope.ground),
+            Column("side slope", "degrees", slope.side),
+        ]
+    columns += further_layers(path)
+    return [column._replace(values=column.values[route.samples]) for column in columns]
 
 
 def further_layers(path: Path) -> list[Column]:
     """All layers but the height, along the profile: first those whose changes cost, then costs."""
     surface, profile = path.surface, path.profile
-    values = [*profile.values.T[1:], *profile.costs.T]
-    layers = [*surface.layers[1:], *surface.costs]
-    return [Column(a.name, a.unit, v) for a, v in zip(layers, values, strict=True)]
+    values = [*profile.values.T, *profile.costs.T]
+    layers = [*surface.layers, *surface.costs]
+    columns = [Column(a.name, a.unit, v) for a, v in zip(layers, values, strict=True)]
+    k = height_layer(surface)
+    return columns if k is None else columns[:k] + columns[k + 1 :]
 
 
 def clean(text: str) -> str:

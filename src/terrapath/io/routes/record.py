@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ... import __version__
-from ...problem import Solution
+from ...problem import Path, Solution
+from .route import Route
 
 
 def plain(value: object) -> Any:
@@ -95,16 +96,26 @@ def _measures(solution: Solution) -> dict[str, Any]:
     return {
         **_corridor(solution),
         "status": solution.status.value,
+        "value": solution.value,
+        "unit": solution.unit,
         "length": solution.length,
+        **_ground(path),
         "unrefined_length": None if solution.unrefined is None else solution.unrefined.length,
         "cost": solution.cost,
         "lower_bound": solution.lower_bound,
         "gap": solution.gap,
-        "climb": None if path is None else path.climb,
         "straight_length": solution.straight_length,
         "contributions": None if path is None else path.contributions,
-        "unit": solution.problem.surface.unit,
     }
+
+
+# The numbers on the ground, and their names in records.
+GROUND_NUMBERS = ("ground_length", "ground_unit", "climb", "descent", "steepest", "steepest_side")
+
+
+def _ground(path: Path | None) -> dict[str, Any]:
+    """What people ask of a route, whatever was minimised."""
+    return {name: None if path is None else getattr(path, name) for name in GROUND_NUMBERS}
 
 
 def _legs(solution: Solution) -> list[dict[str, Any]]:
@@ -114,7 +125,10 @@ def _legs(solution: Solution) -> list[dict[str, Any]]:
             "start": leg.problem.start,
             "goal": leg.problem.goal,
             "status": leg.status.value,
+            "value": leg.value,
+            "unit": leg.unit,
             "length": leg.length,
+            **_ground(leg.path),
             "lower_bound": leg.lower_bound,
             "seconds": leg.seconds,
         }
@@ -125,6 +139,9 @@ def _legs(solution: Solution) -> list[dict[str, Any]]:
 def route_record(solution: Solution) -> dict[str, Any]:
     """All that is known about a solution, ready for JSON.
 
+    ``value`` is what was minimised, in ``unit``. ``ground_length``, ``climb`` and ``descent`` are
+    in ``ground_unit``, metres on maps; ``steepest`` is the largest grade in the direction of
+    travel and ``steepest_side`` the largest slope across it, rise over horizontal distance.
     ``start``, ``goal``, ``via`` and ``path`` are on the planning plane, map units;
     with a georeference ``crs`` names that plane, and ``start_lonlat``, ``goal_lonlat`` and
     ``path_lonlat`` are longitude and latitude in degrees. Where the path was refined,
@@ -150,11 +167,12 @@ def route_record(solution: Solution) -> dict[str, Any]:
     return dict(plain(record))
 
 
-def summary(solution: Solution) -> dict[str, Any]:
+def summary(route: Route) -> dict[str, Any]:
     """All that is known about a route except its points: measures and provenance."""
-    return dict(plain({**_measures(solution), **provenance(solution)}))
+    solution = route.solution
+    return dict(plain({**_measures(solution), **route.facts, **provenance(solution)}))
 
 
-def write(solution: Solution, file: Path) -> None:
-    """Write the record."""
-    file.write_text(dump(route_record(solution)), encoding="utf-8")
+def write(route: Route, file: FilePath) -> None:
+    """Write the record. It holds every point that was planned, so that its value can be checked."""
+    file.write_text(dump(route_record(route.solution)), encoding="utf-8")

@@ -7,11 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...problem import Path as Route, Solution
-from ...surface import Surface
 from ...validation import Array
-from .profile import headings, slopes
-from .units import height_metres, plane_metres
+from .profile import headings, heights, slopes
+from .route import Route
 
 TOPIC, FRAME = "/plan", "map"
 # The oldest version that the library writes: every ROS 2 since Humble reads it.
@@ -20,12 +18,10 @@ BAG_VERSION: Literal[8] = 8
 STAMP = 0
 
 
-def positions(surface: Surface, route: Route) -> Array:
-    """(m, 3): the profile's points in metres; heights without a unit are in the plane's."""
-    plane = plane_metres(surface.georeference) or 1.0
-    height = height_metres(surface) or plane
-    profile = route.profile
-    return np.column_stack([plane * profile.points, height * profile.values[:, 0]])
+def positions(route: Route) -> Array:
+    """(m, 3): the route's points in metres; heights without a unit are in the plane's."""
+    path, points = route.path, route.points
+    return np.column_stack([path.ground.metres * points, heights(path, points)])
 
 
 def orientations(route: Route) -> Array:
@@ -33,18 +29,17 @@ def orientations(route: Route) -> Array:
 
     Yaw is counted from the x axis, anticlockwise; nose up is a negative pitch (REP 103).
     """
-    ahead = headings(route.profile.points)
+    ahead = headings(route.points)
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
-    pitch = -np.radians(slopes(route).along)
+    pitch = -np.radians(slopes(route.path).along[route.samples])
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.from_euler("ZY", np.column_stack([yaw, pitch]))
     return np.asarray(turned.as_quat(canonical=True))
 
 
-def _message(solution: Solution, types: Any) -> Any:
+def _message(route: Route, types: Any) -> Any:
     """The nav_msgs/Path."""
-    assert solution.path is not None
     point, quaternion, pose, pose_stamped, header, time, path = (
         types[name]
         for name in (
@@ -58,8 +53,7 @@ def _message(solution: Solution, types: Any) -> Any:
         )
     )
     heading = header(stamp=time(sec=STAMP, nanosec=0), frame_id=FRAME)
-    places = positions(solution.problem.surface, solution.path).tolist()
-    turns = orientations(solution.path).tolist()
+    places, turns = positions(route).tolist(), orientations(route).tolist()
     poses = [
         pose_stamped(heading, pose(point(*place), quaternion(*turn)))
         for place, turn in zip(places, turns, strict=True)
@@ -67,7 +61,7 @@ def _message(solution: Solution, types: Any) -> Any:
     return path(heading, poses)
 
 
-def write(solution: Solution, folder: Path) -> None:
+def write(route: Route, folder: Path) -> None:
     """Write a bag into a folder that does not exist yet."""
     import sqlite3
 
@@ -76,7 +70,7 @@ def write(solution: Solution, folder: Path) -> None:
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    message = _message(solution, store.types)
+    message = _message(route, store.types)
     kind = message.__msgtype__
     try:
         with Writer(folder, version=BAG_VERSION, storage_plugin=StoragePlugin.SQLITE3) as bag:

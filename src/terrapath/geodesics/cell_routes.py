@@ -1,0 +1,320 @@
+"""Shortest routes where costs are constant in cells: searched on the cells' sides, and polished.
+
+Within a cell a shortest path is straight, or nearly so on hills. It bends on the sides of cells,
+as light does. ``shortest_through_cells`` searches points on the sides of all cells;
+``polished`` searches ever denser ones near a path, and moves its bends to where Snell's law holds.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .._kernels.geodesics import cell_routes as kernels
+from .._kernels.geodesics.visibility import UNSEEN, Search
+from .._kernels.surface.surfaces import Spline
+from .._support.watching import MustStop, never
+from ..problem import Path, Problem
+from ..surface import Surface
+from ..surface.metric import segment_lengths
+from ..validation import Array
+from .snell import obeying_snell
+
+Integers = npt.NDArray[np.int64]
+
+# Points settled between two looks at whether to stop.
+CHUNK = 20_000
+
+# Points on each side, besides its ends, in a search of the whole map: as many as make no more than
+# this many points in all. Where even one makes more than the second number, there is no search.
+POINTS_PER_SIDE, MANY_POINTS, MOST_POINTS = 3, 1_000_000, 6_000_000
+
+# The distances of the points near a path, as shares of a side, in one search after the other.
+SHARES = (0.25, 0.1, 0.04, 0.015, 0.006)
+# So many points lie on either side of a bend.
+BESIDE = 2
+
+# On hills the path between two sides is not quite straight: cells are cut into parts of at most
+# this share of a feature of the ground.
+FEATURES_PER_PART = 0.5
+
+# Places this near to a side lie on it, as a share of the side.
+ON_SIDE = 1e-9
+
+# A bend is left out where that lengthens the path by no more than this share of it.
+STRAIGHT = 1e-12
+
+
+class CellGrid(NamedTuple):
+    """The cells within a problem's bounds: those at the edge are cut off there."""
+
+    x: Array  # (nx + 1,): where the sides are
+    y: Array
+    costs: Array  # (ny, nx)
+
+    @property
+    def sides(self) -> Array:
+        """(2,): the typical lengths of sides."""
+        return np.array([np.median(np.diff(self.x)), np.median(np.diff(self.y))])
+
+
+def grid_of(problem: Problem) -> CellGrid | None:
+    """The cells that a problem's cost is constant in; None where there are none."""
+    surface, bounds = problem.surface, problem.bounds
+    if surface.cost_cells is None or not isinstance(surface.data, Spline):
+        return None
+    cells = surface.data.cells
+    rows, columns = cells.costs.shape
+    x = _sides(bounds.x1_min, bounds.x1_max, cells.x0, cells.dx, columns, _parts(surface, cells.dx))
+    y = _sides(bounds.x2_min, bounds.x2_max, cells.y0, cells.dy, rows, _parts(surface, cells.dy))
+    i, j = (
+        np.clip(np.floor((0.5 * (at[1:] + at[:-1]) - origin) / step).astype(int), 0, count - 1)
+        for at, origin, step, count in (
+            (x, cells.x0, cells.dx, columns),
+            (y, cells.y0, cells.dy, rows),
+        )
+    )
+    return CellGrid(x, y, cells.costs[np.ix_(j, i)])
+
+
+def _is_flat(surface: Surface) -> bool:
+    """Has it no relief, and no smooth cost?"""
+    data = surface.data
+    if not isinstance(data, Spline) or surface.cost_data is not None:
+        return False
+    reliefs = [float(np.ptp(layer)) for layer in data.coefficients]
+    return not (np.array(reliefs) * data.weights).any()
+
+
+def _parts(surface: Surface, side: float) -> int:
+    """Into how many parts the side of a cell is cut."""
+    if _is_flat(surface):
+        return 1
+    return max(math.ceil(side / (FEATURES_PER_PART * surface.resolution) - 1e-9), 1)
+
+
+def _sides(low: float, high: float, origin: float, step: float, count: int, parts: int) -> Array:
+    """Where the sides of cells, and of their parts, are between two bounds, and these bounds."""
+    places = origin + step * np.arange(count * parts + 1) / parts
+    inside = (places > low + ON_SIDE * step) & (places < high - ON_SIDE * step)
+    return np.concatenate([[low], places[inside], [high]])
+
+
+# Points on sides
+
+
+def _touched(grid: CellGrid, points: Array) -> Integers:
+    """(n, 4): the cells that hold or touch points (n, 2); -1 for none, at the end."""
+    pairs = []
+    for places, at in ((grid.x, points[:, 0]), (grid.y, points[:, 1])):
+        slack = ON_SIDE * float(np.diff(places).max())
+        last = len(places) - 2
+        before = np.clip(np.searchsorted(places, at - slack, "right") - 1, 0, last)
+        after = np.clip(np.searchsorted(places, at + slack, "right") - 1, 0, last)
+        pairs.append((before, after))
+    (i0, i1), (j0, j1) = pairs
+    columns = grid.costs.shape[1]
+    cells = np.stack([j0 * columns + i0, j0 * columns + i1, j1 * columns + i0, j1 * columns + i1])
+    cells[1, i0 == i1] = -1
+    cells[2, j0 == j1] = -1
+    cells[3, (i0 == i1) | (j0 == j1)] = -1
+    # Those that are none come last.
+    return np.ascontiguousarray(np.take_along_axis(cells, np.argsort(cells < 0, axis=0), 0).T)
+
+
+def _sides_with(problem: Problem, grid: CellGrid, points: Array) -> kernels.Sides:
+    """Cells, and points (n, 2) on their sides; start and goal are added at the end."""
+    points = np.ascontiguousarray(np.vstack([points, problem.start, problem.goal]))
+    touched = _touched(grid, points)
+    known = touched >= 0
+    cells, labels = np.unique(touched[known], return_inverse=True)
+    touched[known] = labels
+    held = np.nonzero(known)[0][np.argsort(labels, kind="stable")]
+    first = np.concatenate([[0], np.cumsum(np.bincount(labels, minlength=len(cells)))])
+    surface, is_flat = problem.surface, _is_flat(problem.surface)
+    heights = np.zeros((len(points), 0 if is_flat else len(surface.layers)))
+    kernels.fill_heights(surface.data, points, heights)
+    return kernels.Sides(
+        costs=grid.costs.ravel()[cells],
+        points=points,
+        heights=heights,
+        touched=touched,
+        first=first.astype(np.int64),
+        held=held.astype(np.int64),
+        floor=surface.least_cost,
+        is_flat=is_flat,
+        has_obstacles=problem.free_space.has_obstacles,
+    )
+
+
+def _all_points(grid: CellGrid, per_side: int) -> Array:
+    """The corners of all cells and points between them (n, 2)."""
+    shares = np.arange(1, per_side + 1) / (per_side + 1)
+    between = [(at[:-1, None] + np.diff(at)[:, None] * shares).ravel() for at in (grid.x, grid.y)]
+    grids = (grid.x, grid.y), (between[0], grid.y), (grid.x, between[1])
+    return np.concatenate([np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2) for x, y in grids])
+
+
+def _search(problem: Problem, sides: kernels.Sides, must_stop: MustStop) -> Array | None:
+    """The shortest path through points on sides (m, 2); None where none is found."""
+    count = len(sides.points)
+    search = Search(
+        cost=np.full(count, math.inf),
+        parent=np.full(count, -1, np.int64),
+        key=np.empty(count),
+        slot=np.full(count, UNSEEN, np.int64),
+        heap=np.empty(count, np.int64),
+        size=np.zeros(1, np.int64),
+    )
+    kernels.begin(search, count - 2)
+    given = (problem.surface.data, problem.free_space.data, sides, search, CHUNK)
+    while kernels.search_sides(*given) == CHUNK:
+        if must_stop():
+            return None
+    if math.isinf(search.cost[-1]):
+        return None
+    visited = [count - 1]
+    while (parent := int(search.parent[visited[-1]])) >= 0:
+        visited.append(parent)
+    return np.asarray(sides.points[visited[::-1]])
+
+
+def shortest_through_cells(problem: Problem, must_stop: MustStop = never) -> Path | None:
+    """The shortest path through a few points on each side of all cells.
+
+    None where costs are not constant in cells, where the map is too large, where it must stop, and
+    where obstacles leave no path through such points.
+    """
+    grid = grid_of(problem)
+    if grid is None:
+        return None
+    per_side = POINTS_PER_SIDE
+    while per_side > 1 and (1 + 2 * per_side) * grid.costs.size > MANY_POINTS:
+        per_side -= 1
+    if (1 + 2 * per_side) * grid.costs.size > MOST_POINTS:
+        return None
+    sides = _sides_with(problem, grid, _all_points(grid, per_side))
+    points = _search(problem, sides, must_stop)
+    return None if points is None else problem.path(points)
+
+
+# Polishing
+
+
+def polished(problem: Problem, path: Path, must_stop: MustStop = never) -> Path:
+    """The locally shortest path near a path: its bends move along the sides of cells.
+
+    Searches through ever denser points on the sides near the path, then Newton's method in the
+    places of the bends. The path is never longer than the one given, and stays in free space.
+    """
+    grid = grid_of(problem)
+    assert grid is not None
+    best = path
+    for share in SHARES:
+        if must_stop():
+            return best
+        points = _crossings(grid, best.points)
+        sides = _sides_with(problem, grid, _points_near(grid, points, share))
+        found = _search(problem, sides, must_stop)
+        best = _shorter(problem, best, found)
+    if must_stop():
+        return best
+    best = _shorter(problem, best, _without_bends(problem, best.points))
+    best = _shorter(problem, best, obeying_snell(problem.surface, grid.x, grid.y, best.points))
+    return _shorter(problem, best, _without_bends(problem, best.points))
+
+
+def _shorter(problem: Problem, best: Path, points: Array | None) -> Path:
+    """The better of two paths; of two that are equally long, the one with fewer points."""
+    if points is None or len(points) < 2 or not problem.allows(points):
+        return best
+    other = problem.path(points)
+    slack = len(best.points) * STRAIGHT if len(points) < len(best.points) else 0.0
+    return other if other.length <= best.length * (1.0 + slack) else best
+
+
+def _crossings(grid: CellGrid, points: Array) -> Array:
+    """A path's points (m, 2), with those where it crosses sides of cells."""
+    pieces = [points[:1]]
+    for a, b in pairwise(points):
+        shares = [np.ones(1)]
+        for axis, places in enumerate((grid.x, grid.y)):
+            low, high = sorted((a[axis], b[axis]))
+            first, last = np.searchsorted(places, low, "right"), np.searchsorted(places, high)
+            if last > first:
+                shares.append((places[first:last] - a[axis]) / (b[axis] - a[axis]))
+        pieces.append(a + np.unique(np.concatenate(shares))[:, None] * (b - a))
+        pieces[-1][-1] = b
+    return np.concatenate(pieces)
+
+
+def _points_near(grid: CellGrid, points: Array, share: float) -> Array:
+    """Points on sides near a path (m, 2) and the path's own; they lie close around its bends.
+
+    share : their distance, as a share of a side.
+    """
+    steps = share * grid.sides
+    offsets = np.arange(-BESIDE, BESIDE + 1.0)
+    found = [points]
+    are_on = []
+    for axis, places in enumerate((grid.x, grid.y)):
+        nearest = np.clip(np.searchsorted(places, points[:, axis]), 1, len(places) - 1)
+        before = points[:, axis] - places[nearest - 1] < places[nearest] - points[:, axis]
+        side = places[nearest - before]
+        are_on.append(np.abs(points[:, axis] - side) <= ON_SIDE * grid.sides[axis])
+        here, at = points[are_on[-1]], side[are_on[-1]]
+        moved = np.repeat(here[:, None], len(offsets), axis=1)
+        moved[..., axis] = at[:, None]
+        moved[..., 1 - axis] += offsets * steps[1 - axis]
+        found.append(moved.reshape(-1, 2))
+    inner = points[~(are_on[0] | are_on[1])]
+    around = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2) * steps
+    found.append((inner[:, None] + around).reshape(-1, 2))
+    found.append(_corners_and_middles(grid, points))
+    return np.clip(np.concatenate(found), (grid.x[0], grid.y[0]), (grid.x[-1], grid.y[-1]))
+
+
+def _corners_and_middles(grid: CellGrid, points: Array) -> Array:
+    """The corners, and the middles of sides, of the cells near a path's points (m, 2)."""
+    rows, columns = grid.costs.shape
+    cells = _touched(grid, points)
+    cells = np.unique(cells[cells >= 0])
+    j, i = np.divmod(cells, columns)
+    near = np.zeros((rows + 2, columns + 2), bool)
+    for down in range(3):
+        for east in range(3):
+            near[j + down, i + east] = True
+    j, i = np.nonzero(near[1:-1, 1:-1])
+    x = np.stack([grid.x[i], 0.5 * (grid.x[i] + grid.x[i + 1]), grid.x[i + 1]], axis=1)
+    y = np.stack([grid.y[j], 0.5 * (grid.y[j] + grid.y[j + 1]), grid.y[j + 1]], axis=1)
+    places = [
+        np.column_stack([x[:, a], y[:, b]]) for a in range(3) for b in range(3) if (a, b) != (1, 1)
+    ]
+    return np.unique(np.concatenate(places), axis=0)
+
+
+def _without_bends(problem: Problem, points: Array) -> Array:
+    """A path's points (m, 2) without those whose leaving out does not lengthen it."""
+    surface, space = problem.surface, problem.free_space
+    moved = np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))
+    points = points[moved] if moved.sum() > 1 else points[[0, -1]]
+    allowed = STRAIGHT * float(segment_lengths(surface, points[:-1], points[1:]).sum())
+    parity, unchanged = 1, 0
+    while len(points) > 2 and unchanged < 2:
+        k = np.arange(parity, len(points) - 1, 2)
+        if len(k) == 0:
+            parity, unchanged = 3 - parity, unchanged + 1
+            continue
+        before, here, after = points[k - 1], points[k], points[k + 1]
+        bent = segment_lengths(surface, before, here) + segment_lengths(surface, here, after)
+        leave = segment_lengths(surface, before, after) <= bent + allowed
+        if space.has_obstacles:
+            leave &= space.segments_are_free(before, after)
+        points = np.delete(points, k[leave], axis=0)
+        unchanged = 0 if leave.any() else unchanged + 1
+        parity = 3 - parity
+    return points

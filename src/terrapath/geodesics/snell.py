@@ -1,0 +1,109 @@
+"""Newton's method in the places where a path crosses the sides of cells of constant cost.
+
+At the shortest path Snell's law holds: cost times the sine of the angle is the same on both sides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import solve_banded
+
+from ..surface import Surface
+from ..surface.metric import segment_lengths
+from ..validation import Array
+
+# Differences are taken over this share of a side, and no bend comes nearer to a side's end.
+STEP = 1e-4
+# Steps of Newton's method, and how often one is halved.
+MOST_STEPS, MOST_HALVINGS = 20, 8
+# It ends where a step shortens the path by no more than this share.
+GAIN = 1e-14
+# Places this near to a side lie on it, as a share of the side.
+ON_SIDE = 1e-9
+
+
+def obeying_snell(surface: Surface, x: Array, y: Array, points: Array) -> Array:
+    """A path (m, 2) whose bends have moved along the sides of cells to where it is shortest.
+
+    x (nx + 1,), y (ny + 1,) : where the sides are. Bends that are at corners, or not on a side,
+    stay where they are; no bend leaves its side.
+    """
+    along, low, high = _rooms(x, y, points)
+    if not (low < high).any():
+        return points
+    length = _length(surface, points)
+    for _ in range(MOST_STEPS):
+        step = _newton_step(surface, points, along)
+        for _ in range(MOST_HALVINGS):
+            taken = np.clip(step, low, high)
+            moved = points + along * taken[:, None]
+            shorter = _length(surface, moved)
+            if shorter < length:
+                break
+            step = 0.5 * step
+        else:
+            return points
+        points, low, high = moved, low - taken, high - taken
+        gain, length = length - shorter, shorter
+        if gain <= GAIN * length:
+            break
+    return points
+
+
+def _length(surface: Surface, points: Array) -> float:
+    return float(segment_lengths(surface, points[:-1], points[1:]).sum())
+
+
+def _rooms(x: Array, y: Array, points: Array) -> tuple[Array, Array, Array]:
+    """For each point, the vector of its side (m, 2), and how far it may move, (m,) down and up.
+
+    These are shares of the side; a point that may not move has the vector 0.
+    """
+    along, low, high = np.zeros_like(points), np.zeros(len(points)), np.zeros(len(points))
+    (column, share_x), (row, share_y) = _place(x, points[:, 0]), _place(y, points[:, 1])
+    for axis, places, k, share, across in (
+        (0, x, column, share_x, share_y),
+        (1, y, row, share_y, share_x),
+    ):
+        moves = (share > 2.0 * STEP) & (share < 1.0 - 2.0 * STEP) & _is_on_side(across)
+        moves[[0, -1]] = False
+        along[moves, axis] = np.diff(places)[k[moves]]
+        low[moves], high[moves] = 2.0 * STEP - share[moves], 1.0 - 2.0 * STEP - share[moves]
+    return along, low, high
+
+
+def _place(places: Array, at: Array) -> tuple[npt.NDArray[np.intp], Array]:
+    """Between which two sides each place is, and its share of the way from one to the other."""
+    k = np.clip(np.searchsorted(places, at, "right") - 1, 0, len(places) - 2)
+    return k, (at - places[k]) / np.diff(places)[k]
+
+
+def _is_on_side(share: Array) -> npt.NDArray[np.bool_]:
+    return np.asarray(np.abs(share - np.rint(share)) <= ON_SIDE)
+
+
+def _newton_step(surface: Surface, points: Array, along: Array) -> Array:
+    """The step (m,) of all bends, as shares of their sides: a tridiagonal system."""
+    still = np.asarray(~along.any(axis=1))
+    lengths = np.empty((3, 3, len(points) - 1))
+    for a in range(3):
+        for b in range(3):
+            begin = points[:-1] + (a - 1) * STEP * along[:-1]
+            end = points[1:] + (b - 1) * STEP * along[1:]
+            lengths[a, b] = segment_lengths(surface, begin, end)
+    slope, bend = np.zeros(len(points)), np.zeros(len(points))
+    slope[:-1] += (lengths[2, 1] - lengths[0, 1]) / (2.0 * STEP)
+    slope[1:] += (lengths[1, 2] - lengths[1, 0]) / (2.0 * STEP)
+    bend[:-1] += (lengths[2, 1] - 2.0 * lengths[1, 1] + lengths[0, 1]) / STEP**2
+    bend[1:] += (lengths[1, 2] - 2.0 * lengths[1, 1] + lengths[1, 0]) / STEP**2
+    both = lengths[2, 2] - lengths[2, 0] - lengths[0, 2] + lengths[0, 0]
+    both = both / (4.0 * STEP**2)
+    # Where the path runs straight along a side there is no curvature; a step there is short.
+    least = 1e-3 * float(np.abs(bend).max(initial=0.0)) + 1e-300
+    bend = np.where(still, 1.0, np.maximum(bend, least))
+    slope[still] = 0.0
+    both[still[:-1] | still[1:]] = 0.0
+    banded = np.zeros((3, len(points)))
+    banded[0, 1:], banded[1], banded[2, :-1] = both, bend, both
+    return np.asarray(solve_banded((1, 1), banded, -slope))
