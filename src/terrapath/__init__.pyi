@@ -1,4 +1,4 @@
-from . import geodesics as geodesics, scenario as scenario
+from . import geodesics as geodesics, scenario as scenario, travel as travel
 from ._version import __version__ as __version__
 from .certificates.certificate import Certificate as Certificate
 from .certificates.search import lower_bound as lower_bound
@@ -46,6 +46,7 @@ from .plotting import (
     plot_page as plot_page,
     plot_profile as plot_profile,
     plot_route as plot_route,
+    plot_travel as plot_travel,
 )
 from .problem import (
     Path as Path,

@@ -19,7 +19,17 @@ from .console import ExitCode, remark, remarks, settle, without_broken_messages
 UsageError: Any = typer.BadParameter.__mro__[1]
 
 # Each is in the module of its name, such as ``plan_command`` in ``plan``.
-COMMANDS = ("plan", "check", "field", "init", "schema", "scenes", "reproduce", "warmup")
+COMMANDS = (
+    "plan",
+    "check",
+    "field",
+    "travel",
+    "init",
+    "schema",
+    "scenes",
+    "reproduce",
+    "warmup",
+)
 
 
 def _show_version(wanted: bool) -> None:

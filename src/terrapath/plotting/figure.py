@@ -1,4 +1,4 @@
-"""Figures of routes, profiles and distance fields, and picture files of them."""
+"""Figures of routes, profiles, distance fields and paces, and picture files of them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from ..distance.field import DistanceField
 from ..errors import MapError
 from ..problem import Solution
 from ..surface.ground import quantity, value_unit
+from ..travel import TravelModel
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
 from .labels import format_length, in_words, lengths_in_words, straight_name
 from .map_view import draw_map
 from .perspective import draw_perspective
+from .travel_view import draw_pace
 
 DOTS_PER_INCH = 140
 # Of PNG's nine levels of compression: twice as fast as level 6, the default, and 5 % larger.
@@ -95,6 +97,17 @@ def draw_profile(solution: Solution) -> Any:
     return figure
 
 
+def draw_travel(model: TravelModel) -> Any:
+    """A matplotlib figure: a travel model's pace over the grade, as published and relaxed."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    draw_pace(figure.add_subplot(), model)
+    figure.suptitle(repr(model), fontsize=11, wrap=True)
+    figure.supxlabel(model.source, fontsize=8, wrap=True)
+    return figure
+
+
 def require_known_picture(path: Path) -> None:
     """Raise MapError for a file ending that is not of a known picture format."""
     if path.suffix.lower() not in FORMATS:
@@ -114,6 +127,11 @@ def plot_profile(solution: Solution, path: str | Path) -> None:
 def plot_field(field: DistanceField, path: str | Path) -> None:
     """Draw a distance field to a picture file, completely or not at all."""
     _save(lambda: draw_field(field), Path(path))
+
+
+def plot_travel(model: TravelModel, path: str | Path) -> None:
+    """Draw a travel model's pace to a picture file, completely or not at all."""
+    _save(lambda: draw_travel(model), Path(path))
 
 
 def _save(draw: Callable[[], Any], target: Path) -> None:

@@ -1,0 +1,1 @@
+"""Kernels of travel models: a pace, its derivatives and its lower lines."""

@@ -1,0 +1,124 @@
+"""A relaxed pace as arrays, and what kernels ask of it.
+
+A pace is cost per horizontal metre as a convex function P of the grade m. Between its knots it is
+made of polynomials; beyond them it goes straight. See ``docs/mathematics.md``.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..compiler import inner_kernel, kernel
+
+DEGREE = 11  # of the polynomials: Tobler's pace takes one on each side of its kink
+
+
+class Pace(NamedTuple):
+    """A relaxed pace function: n polynomials, two straight tails, and lines that lie below it.
+
+    The arrays are of float64 in C order, except ``guide``. Piece i reaches from ``knots[i]`` to
+    ``knots[i + 1]``. With t from -1 to 1 along it, its value is sum over k of
+    ``coefficients[i, k] t^k``.
+    """
+
+    knots: Any  # (n + 1,) grades, increasing
+    coefficients: Any  # (n, DEGREE + 1)
+    guide: Any  # (cells,) int64: the piece at the left end of each cell, all of one width
+    cells_per_grade: float
+    tails: Any  # (2, 2): slope B and intercept A of the line below the first knot, above the last
+    kinks: Any  # (k,) grades where the slope jumps, increasing
+    slopes: Any  # (lines,) increasing: B of each line A + B m below P
+    intercepts: Any  # (lines,): A(B) = min over m of P(m) - B m, 0 or above
+
+
+class Jet(NamedTuple):
+    """A value with its first and second derivatives."""
+
+    value: float
+    slope: float
+    curvature: float
+
+
+@inner_kernel
+def piece_at(pace, grade):
+    """The piece whose grades hold this one; the first or the last one beyond the knots."""
+    cell = int((grade - pace.knots[0]) * pace.cells_per_grade)
+    piece = pace.guide[min(max(cell, 0), len(pace.guide) - 1)]
+    while piece + 1 < len(pace.coefficients) and grade >= pace.knots[piece + 1]:
+        piece += 1
+    return piece
+
+
+@inner_kernel
+def pace_jet(pace, grade):
+    """P, P' and P'' at a grade; at a kink those on its uphill side."""
+    knots = pace.knots
+    if grade < knots[0]:
+        return Jet(pace.tails[0, 1] + pace.tails[0, 0] * grade, pace.tails[0, 0], 0.0)
+    if grade >= knots[-1]:
+        return Jet(pace.tails[1, 1] + pace.tails[1, 0] * grade, pace.tails[1, 0], 0.0)
+    piece = piece_at(pace, grade)
+    half = 0.5 * (knots[piece + 1] - knots[piece])
+    t = (grade - knots[piece]) / half - 1.0
+    value, slope, curvature = pace.coefficients[piece, DEGREE], 0.0, 0.0
+    for k in range(DEGREE - 1, -1, -1):  # Horner's scheme for the polynomial and its derivatives
+        curvature = curvature * t + slope
+        slope = slope * t + value
+        value = value * t + pace.coefficients[piece, k]
+    return Jet(value, slope / half, 2.0 * curvature / (half * half))
+
+
+@inner_kernel
+def pace_at(pace, grade):
+    """P at a grade: cost per horizontal metre."""
+    knots = pace.knots
+    if grade < knots[0]:
+        return pace.tails[0, 1] + pace.tails[0, 0] * grade
+    if grade >= knots[-1]:
+        return pace.tails[1, 1] + pace.tails[1, 0] * grade
+    piece = piece_at(pace, grade)
+    t = 2.0 * (grade - knots[piece]) / (knots[piece + 1] - knots[piece]) - 1.0
+    value = pace.coefficients[piece, DEGREE]
+    for k in range(DEGREE - 1, -1, -1):
+        value = value * t + pace.coefficients[piece, k]
+    return value
+
+
+@inner_kernel
+def intercept_at(pace, slope):
+    """A(B) = min over m of P(m) - B m for a slope B; minus infinity where there is no minimum.
+
+    P' grows with m, so that the grade with P' = B is found by bisection, at kinks too.
+    """
+    if slope < pace.tails[0, 0] or slope > pace.tails[1, 0]:
+        return -np.inf
+    low, high = pace.knots[0], pace.knots[-1]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if pace_jet(pace, middle).slope < slope:
+            low = middle
+        else:
+            high = middle
+    return min(pace_at(pace, low) - slope * low, pace_at(pace, high) - slope * high)
+
+
+@kernel
+def evaluate_paces(pace, grades, values):
+    """Write P at grades (n,) to values (n,)."""
+    for i in range(len(grades)):
+        values[i] = pace_at(pace, grades[i])
+
+
+@kernel
+def evaluate_jets(pace, grades, jets):
+    """Write P, P' and P'' at grades (n,) to jets (n, 3)."""
+    for i in range(len(grades)):
+        jet = pace_jet(pace, grades[i])
+        jets[i, 0], jets[i, 1], jets[i, 2] = jet.value, jet.slope, jet.curvature
+
+
+@kernel
+def evaluate_intercepts(pace, slopes, values):
+    """Write A(B) at slopes (n,) to values (n,)."""
+    for i in range(len(slopes)):
+        values[i] = intercept_at(pace, slopes[i])
