@@ -67,18 +67,22 @@ def _print_all(models: list[TravelModel]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    columns = ("model", "unit", "grades", "critical grades", "per metre of", "source")
-    table = Table(*columns, box=None, pad_edge=False)
+    console = Console(highlight=False)
+    table = Table(box=None, pad_edge=False)
+    for column in ("model", "unit", "grades", "critical grades", "per metre of"):
+        table.add_column(column, no_wrap=True)
     for model in models:
         table.add_row(
             model.name,
             model.unit,
             _range(model.grades),
             _critical(model.critical),
-            model.distance,
-            model.source,
+            f"{model.distance} distance",
         )
-    Console().print(table)
+    console.print(table)
+    console.print("\nSources:")
+    for model in models:
+        console.print(f"  {model.name}: {model.source}", soft_wrap=True)
 
 
 def _print_one(model: TravelModel) -> None:
@@ -121,4 +125,4 @@ def _range(grades: tuple[float, float]) -> str:
 
 def _critical(critical: tuple[float, float]) -> str:
     down, up = (f"{100 * grade:.3g} %" if math.isfinite(grade) else "none" for grade in critical)
-    return f"{down} down, {up} up"
+    return f"{down}, {up}"

@@ -102,5 +102,5 @@ def from_function(
         kinks=as_array(list(kinks), "kinks", shape=(None,)).tolist(),
         distance=distance,
         beyond=beyond,
-        options={"grades": tuple(grades)},
+        options={"grades": grades},
     )

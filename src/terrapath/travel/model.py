@@ -165,7 +165,7 @@ class TravelModel:
 
         A critical grade inside the range says what to do on all steeper ground.
         """
-        for grade in (-steepest, steepest):
+        for grade in (steepest, -steepest):
             self._check_one(grade)
 
     def _checked(self, grades: npt.ArrayLike) -> tuple[Array, tuple[int, ...]]:
@@ -219,7 +219,7 @@ def travel_model(
         raise InputError(f"unit={unit!r} is not a unit; give one such as 's' or 'J'")
     low, high = _as_range(grades)
     pace = partial(_on_slope, formula) if distance == "slope" else formula
-    window = max(low, -STEEPEST), min(high, STEEPEST)
+    window = -STEEPEST if math.isinf(low) else low, STEEPEST if math.isinf(high) else high
     # Pieces are as precise as their largest value, so that gentle grades have their own.
     inside = [m for m in (-1.0, 0.0, 1.0, *kinks) if window[0] < m < window[1]]
     tabulated = fit(pace, (*window, *inside))

@@ -94,12 +94,21 @@ class Pieces(NamedTuple):
         """The least of f(m) - ``slope`` m, and the grade nearest to 0 where it is taken."""
         candidates = [
             (value, grade)
-            for middle, half, coefficients in zip(
-                self.middles, self.halves, self.coefficients, strict=True
-            )
-            for value, grade in _stationary(coefficients, middle, half, slope)
+            for piece in range(len(self.coefficients))
+            for value, grade in self._stationary(piece, slope)
         ]
         return min(candidates, key=lambda pair: (pair[0], abs(pair[1])))
+
+    def _stationary(self, piece: int, slope: float) -> Iterator[tuple[float, float]]:
+        """The values of f - slope m at the ends of a piece and where its derivative is 0."""
+        middle, half = float(self.middles[piece]), float(self.halves[piece])
+        tilted = self.coefficients[piece].copy()
+        tilted[0] -= slope * middle
+        tilted[1] -= slope * half
+        left, right = float(self.knots[piece]), float(self.knots[piece + 1])
+        inside = ((t, middle + t * half) for t in roots(np.asarray(polynomial.polyder(tilted))))
+        for t, grade in ((-1.0, left), (1.0, right), *inside):
+            yield float(polynomial.polyval(t, tilted)), grade
 
 
 def joined(parts: Iterable[Pieces]) -> Pieces:
@@ -120,17 +129,6 @@ def _moved(coefficients: Array, middle: float, half: float) -> Array:
     """The polynomial of t as one of s, where t = middle + half s."""
     values = polynomial.polyval(middle + half * NODES, coefficients)
     return _through(np.asarray(values))
-
-
-def _stationary(
-    coefficients: Array, middle: float, half: float, slope: float
-) -> Iterator[tuple[float, float]]:
-    """The values of f - slope m at the ends of a piece and where its derivative is 0."""
-    tilted = coefficients.copy()
-    tilted[0] -= slope * middle
-    tilted[1] -= slope * half
-    for t in (-1.0, 1.0, *roots(np.asarray(polynomial.polyder(tilted)))):
-        yield float(polynomial.polyval(t, tilted)), middle + t * half
 
 
 def roots(coefficients: Array) -> list[float]:
@@ -172,7 +170,8 @@ def _bases() -> tuple[Array, Array]:
 def evaluate(formula: Formula, grades: Array) -> Array:
     """A formula at grades of any shape; InputError where it is not finite or no array."""
     try:
-        values = np.asarray(formula(grades.ravel()), dtype=np.float64)
+        with np.errstate(all="ignore"):  # what is not finite is found below
+            values = np.asarray(formula(grades.ravel()), dtype=np.float64)
     except (TypeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise InputError(

@@ -19,6 +19,8 @@ from .pieces import Pieces, joined, roots, straight
 
 # Lines this close to the pace touch it; as a share of the pace of level ground.
 TOUCHING = 1e-12
+# Between two bridges nothing is left that is narrower than this.
+SLIVER = 1e-12
 
 
 class End(NamedTuple):
@@ -177,10 +179,10 @@ def _around(pieces: Pieces, grades: Array, sample: int) -> Pieces:
 def _bridged(pieces: Pieces, bridges: list[Bridge]) -> Pieces:
     parts, last = [], float(pieces.knots[0])
     for (start, end), values in bridges:
-        if start > last:
+        if start > last + SLIVER:
             parts.append(pieces.between(last, start))
-        parts.append(straight((start, end), values))
+        parts.append(straight((last if start <= last + SLIVER else start, end), values))
         last = end
-    if last < pieces.knots[-1]:
+    if last < pieces.knots[-1] - SLIVER:
         parts.append(pieces.between(last, float(pieces.knots[-1])))
     return joined(parts)
