@@ -145,8 +145,9 @@ def test_links_lead_somewhere(page):
 def test_the_reference_holds_the_public_face_and_nothing_else():
     pages = "\n".join(page.read_text() for page in REFERENCE)
     names = re.findall(r"^::: terrapath\.([\w.]+)$", pages, re.MULTILINE)
-    scenario = {f"scenario.{name}" for name in tp.scenario.__all__}
-    assert sorted(names) == sorted({*tp.__all__} - {"__version__", "scenario"} | scenario)
+    packages = {name: getattr(tp, name).__all__ for name in ("scenario", "travel")}
+    inside = {f"{package}.{name}" for package, names in packages.items() for name in names}
+    assert sorted(names) == sorted({*tp.__all__} - {"__version__", *packages} | inside)
 
 
 def test_there_are_examples():

@@ -9,6 +9,7 @@ from numpy.polynomial import Polynomial
 
 import terrapath as tp
 from processes import in_another_process
+from terrapath._kernels.travel.paces import evaluate_lower_intercepts
 from terrapath.travel.registry import EXAMPLES, MODELS as REGISTERED
 from travel_judges import LOOSE, MODELS, cases, model_of, pace_of, sampled_hull
 
@@ -154,7 +155,7 @@ def test_what_makes_it_a_relaxed_pace(name):
     size = np.abs(pace).max()
     assert (pace <= raw + 1e-12 * size).all()
     value, slope, curvature = model.jets(GRADES).T
-    np.testing.assert_array_equal(value, pace)
+    np.testing.assert_allclose(value, pace, rtol=0, atol=1e-14 * size)
     assert (curvature >= -1e-9 * size).all()
     assert (np.diff(slope) >= -1e-9 * size).all()
     # F is convex in the velocity: P - m P' >= 0, and 0 beyond the critical grades.
@@ -219,8 +220,15 @@ def test_intercepts_are_the_least_of_pace_less_line(name):
     expected = [(pace - slope * fine).min() for slope in asked]
     np.testing.assert_allclose(model.intercepts(asked), expected, rtol=0, atol=1e-8 * size)
     np.testing.assert_allclose(model.intercepts(slopes), intercepts, rtol=0, atol=1e-11 * size)
-    beyond = [slopes[0] - 0.01 * size, slopes[-1] + 0.01 * size]
+    beyond = np.array([slopes[0] - 0.01 * size, slopes[-1] + 0.01 * size])
     assert (model.intercepts(beyond) == -np.inf).all()
+    # What kernels read from the lines is never above.
+    quick = np.empty(len(asked) + 2)
+    evaluate_lower_intercepts(model.pace, np.append(asked, beyond), quick)
+    below = model.intercepts(asked) - quick[:-2]
+    assert below.min() >= -1e-11 * size
+    assert below.max() <= 4e-6 * size
+    assert (quick[-2:] == -np.inf).all()
 
 
 @pytest.mark.parametrize("name", [name for name in MODELS if name not in LOOSE])

@@ -304,6 +304,8 @@ def _guided(pieces: Pieces, tails: Array, kinks: Array) -> Pace:
     guide = np.clip(np.searchsorted(knots, starts, side="right") - 1, 0, len(knots) - 2)
     return Pace(
         knots=knots,
+        middles=pieces.middles,
+        scales=1.0 / pieces.halves,
         coefficients=np.ascontiguousarray(pieces.coefficients),
         guide=guide.astype(np.int64),
         cells_per_grade=cells_per_grade,

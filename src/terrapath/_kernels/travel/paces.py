@@ -17,11 +17,13 @@ class Pace(NamedTuple):
     """A relaxed pace function: n polynomials, two straight tails, and lines that lie below it.
 
     The arrays are of float64 in C order, except ``guide``. Piece i reaches from ``knots[i]`` to
-    ``knots[i + 1]``. With t from -1 to 1 along it, its value is sum over k of
-    ``coefficients[i, k] t^k``.
+    ``knots[i + 1]``. With t = (m - ``middles[i]``) ``scales[i]``, from -1 to 1 along it, its value
+    is sum over k of ``coefficients[i, k] t^k``.
     """
 
     knots: Any  # (n + 1,) grades, increasing
+    middles: Any  # (n,)
+    scales: Any  # (n,) 2 / the width of a piece
     coefficients: Any  # (n, DEGREE + 1)
     guide: Any  # (cells,) int64: the piece at the left end of each cell, all of one width
     cells_per_grade: float
@@ -58,14 +60,14 @@ def pace_jet(pace, grade):
     if grade >= knots[-1]:
         return Jet(pace.tails[1, 1] + pace.tails[1, 0] * grade, pace.tails[1, 0], 0.0)
     piece = piece_at(pace, grade)
-    half = 0.5 * (knots[piece + 1] - knots[piece])
-    t = (grade - knots[piece]) / half - 1.0
+    scale = pace.scales[piece]
+    t = (grade - pace.middles[piece]) * scale
     value, slope, curvature = pace.coefficients[piece, DEGREE], 0.0, 0.0
     for k in range(DEGREE - 1, -1, -1):  # Horner's scheme for the polynomial and its derivatives
         curvature = curvature * t + slope
         slope = slope * t + value
         value = value * t + pace.coefficients[piece, k]
-    return Jet(value, slope / half, 2.0 * curvature / (half * half))
+    return Jet(value, slope * scale, 2.0 * curvature * scale * scale)
 
 
 @inner_kernel
@@ -77,11 +79,13 @@ def pace_at(pace, grade):
     if grade >= knots[-1]:
         return pace.tails[1, 1] + pace.tails[1, 0] * grade
     piece = piece_at(pace, grade)
-    t = 2.0 * (grade - knots[piece]) / (knots[piece + 1] - knots[piece]) - 1.0
-    value = pace.coefficients[piece, DEGREE]
-    for k in range(DEGREE - 1, -1, -1):
-        value = value * t + pace.coefficients[piece, k]
-    return value
+    t = (grade - pace.middles[piece]) * pace.scales[piece]
+    square = t * t
+    odd, even = pace.coefficients[piece, DEGREE], pace.coefficients[piece, DEGREE - 1]
+    for k in range(DEGREE - 2, 0, -2):  # two sums that do not wait for each other
+        odd = odd * square + pace.coefficients[piece, k]
+        even = even * square + pace.coefficients[piece, k - 1]
+    return even + odd * t
 
 
 @inner_kernel
@@ -100,6 +104,25 @@ def intercept_at(pace, slope):
         else:
             high = middle
     return min(pace_at(pace, low) - slope * low, pace_at(pace, high) - slope * high)
+
+
+@inner_kernel
+def lower_intercept_at(pace, slope):
+    """A number just below A(B), from the lines: quick, and safe where a bound is proven.
+
+    A is concave, so between two lines it lies above the straight one. The difference is at most
+    about what the lines lack of P. Minus infinity beyond the outermost lines.
+    """
+    slopes, intercepts = pace.slopes, pace.intercepts
+    last = len(slopes) - 1
+    if slope < slopes[0] or slope > slopes[last]:
+        return -np.inf
+    above = min(np.searchsorted(slopes, slope, side="right"), last)
+    below = max(above - 1, 0)
+    if below == above:
+        return intercepts[above]
+    share = (slope - slopes[below]) / (slopes[above] - slopes[below])
+    return intercepts[below] + share * (intercepts[above] - intercepts[below])
 
 
 @kernel
@@ -122,3 +145,10 @@ def evaluate_intercepts(pace, slopes, values):
     """Write A(B) at slopes (n,) to values (n,)."""
     for i in range(len(slopes)):
         values[i] = intercept_at(pace, slopes[i])
+
+
+@kernel
+def evaluate_lower_intercepts(pace, slopes, values):
+    """Write what ``lower_intercept_at`` says of slopes (n,) to values (n,)."""
+    for i in range(len(slopes)):
+        values[i] = lower_intercept_at(pace, slopes[i])
