@@ -248,9 +248,9 @@ def test_slopes_are_the_surfaces_own_by_scipy_and_those_of_numpy():
     x, y = 5.0 + 2.0 * np.arange(17), -2.0 + 3.0 * np.arange(13)
     heights = random.normal(size=(13, 17)).cumsum(axis=0)
     surface = tp.Surface.from_grid(heights, x, y)
-    steepness = SlopeLimit(surface, 45.0, surface.bounds)
-    found = np.vstack([steepness._slopes_of_rows(*rows) for rows in ((0, 3), (3, 4), (4, 13))])
-    assert (found == steepness._slopes_of_rows(0, 13)).all()
+    slopes = SlopeLimit(surface, 45.0, surface.bounds, "steepest")._slopes_of_rows()
+    found = np.vstack([slopes(*rows) for rows in ((0, 3), (3, 4), (4, 13))])
+    assert (found == slopes(0, 13)).all()
     along, across = np.gradient(heights, 3.0, 2.0)
     padded = np.pad(heights, 1, mode="reflect", reflect_type="odd")
     horn_x = ndimage.correlate(padded, np.outer([1, 2, 1], [-1, 0, 1]) / 16.0)[1:-1, 1:-1]
@@ -308,7 +308,7 @@ def test_a_route_on_a_real_map_keeps_to_the_slope_by_horn_and_by_differences():
     axes = [size * np.arange(n) for n in heights.shape[::-1]]
     surface = tp.Surface.from_grid(heights, *axes)
     start, goal = (11_000.0, 22_000.0), (27_000.0, 26_000.0)
-    problem = tp.Problem(surface, start, goal, max_slope=25)
+    problem = tp.Problem(surface, start, goal, max_slope=25, slope_measure="steepest")
     solution = tp.plan(problem, "fast-marching", refine=True)
     points = solution.path.profile.points
     j, i = np.rint(points[:, 1] / size).astype(int), np.rint(points[:, 0] / size).astype(int)
@@ -338,7 +338,7 @@ def test_routes_on_the_moon_keep_to_the_slope_by_the_raster(name, band, limit, s
     surface = tp.read_surface(REAL_MAPS / name, height_band=band)
     steep = {}
     for max_slope in (limit, None):
-        problem = tp.Problem(surface, start, goal, max_slope=max_slope)
+        problem = tp.Problem(surface, start, goal, max_slope=max_slope, slope_measure="steepest")
         points = tp.plan(problem, "fast-marching", refine=True).path.profile.points
         with rasterio.open(REAL_MAPS / name) as raster:
             heights = raster.read(band, masked=True).astype(float).filled(np.nan)

@@ -25,6 +25,7 @@ from .medium import EdgeTree, Medium, lift_of
 
 if TYPE_CHECKING:
     from ..space.constraints import Area
+    from ..space.slope_limit import SlopeMeasure
 
 # The length of a step on a path back to the source, in nodes.
 STEP = 0.5
@@ -190,6 +191,7 @@ def distance_field(
     obstacles: Iterable[Obstacle] = (),
     radius: float = 0.0,
     max_slope: float | None = None,
+    slope_measure: SlopeMeasure = "horn",
     keep_in: Area | None = None,
     spacing: float | None = None,
     watch: WatchCount | None = None,
@@ -197,7 +199,7 @@ def distance_field(
     """Distances on the surface from a start to everywhere, by fast marching.
 
     start : (x1, x2), map units, in free space.
-    bounds, obstacles, radius, max_slope, keep_in : as of ``Problem``.
+    bounds, obstacles, radius, max_slope, slope_measure, keep_in : as of ``Problem``.
     spacing : of the nodes, map units; by default a 250th of the region's longer side, or a cell
     of the map where that is less.
     watch : is called now and then with the number of nodes settled; returning True stops the march.
@@ -211,6 +213,7 @@ def distance_field(
         obstacles,
         radius=radius,
         max_slope=max_slope,
+        slope_measure=slope_measure,
         keep_in=keep_in,
     )
     return field_of(problem, spacing=spacing, watch=watch)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -88,19 +89,18 @@ class OpenMap:
         # Heights of damaged files may overflow. They are refused later, or become no-data.
         with gdal(), np.errstate(over="ignore", invalid="ignore"):
             base = self._without_fills(base, heights=True)
-            target = base.grid.planning_grid()
+            target = base.grid.southward() if base.grid.is_upright else base.grid
             bands = self._read(base, target, most_cells)
             factor, unit = self._into_plane_unit(bands[0], target)
-            scale = _scale(self.smoothing, base, target.cell, factor)
-        raster = Raster.on(target, bands)
-        surface = (raster.trimmed() if base.grid.needs_warp else raster).to_surface(
-            names=[part.name for part in self._parts],
-            units=[unit, *(part.band.unit for part in self._parts[1:])],
-            weights=[part.weight for part in self._parts],
-            kinds=[part.kind for part in self._parts],
-            fill_holes=float(self.fill_holes),
-            smoothing=scale,
-        )
+            scale = _scale(self.smoothing, base, math.sqrt(math.prod(base.grid.sides)), factor)
+            surface = Raster.on(target, bands).to_surface(
+                names=[part.name for part in self._parts],
+                units=[unit, *(part.band.unit for part in self._parts[1:])],
+                weights=[part.weight for part in self._parts],
+                kinds=[part.kind for part in self._parts],
+                fill_holes=float(self.fill_holes),
+                smoothing=scale,
+            )
         return replace(surface, source=self.heights.band.label)
 
     def _view(self, within: Rectangle | None, margin: float = 0.0, decimate: int = 1) -> View:
@@ -149,8 +149,8 @@ class OpenMap:
         if target.crs is None and not self.unsaid.is_local:
             _require_no_degrees(heights, target, band.label)
         plane = band.unit_of_axes
-        if target.crs is not None:
-            plane = Georeference(target.crs, target.crs).unit
+        if target.plane is not None:
+            plane = Georeference(target.plane, target.plane).unit
         _tell_of_unit(band, plane)
         factor, unit = _into_plane_unit(band.unit, plane)
         if factor != 1.0:

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import shapely
 
-from .._kernels.surface.surfaces import Spline
 from ..errors import BlockedError, InputError, OutsideSurfaceError
 from ..problem import Problem, Solution, Status
 from ..surface import Surface, metric
@@ -176,9 +175,9 @@ def _without_corridor(rough: Solution, decimate: int) -> Solution:
 
 def _cell(problem: Problem) -> float:
     """The larger side of a cell of the coarse map, map units."""
-    data = problem.surface.data
-    assert isinstance(data, Spline)  # every map is
-    return float(max(data.dx, data.dy))
+    cells = problem.surface.cells
+    assert cells is not None  # every map has them
+    return float(max(cells.dx, cells.dy))
 
 
 def _share(window: tuple[float, float, float, float], surface: Surface) -> float:

@@ -28,7 +28,7 @@ NEIGHBOURS = 32
 def coarse_spacing(problem: Problem, is_rough: bool = False) -> float:
     """The spacing of the first lattice, map units: a cell or a feature, as far as that is cheap."""
     side = problem.bounds.side
-    cells = (min(mask.spacing) for mask in problem.free_space.masks)
+    cells = (min(cells.dx, cells.dy) for cells in problem.mask_cells)
     finest = min(problem.surface.resolution, side / FEWEST_NODES, *cells)
     return max(finest, side / (MOST_ON_ROUGH if is_rough else MOST_NODES))
 

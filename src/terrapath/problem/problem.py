@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.surface.surfaces import Spline
 from ..errors import BlockedError, InputError, OutsideSurfaceError
 from ..space.free_space import FreeSpace, Obstacle
-from ..space.lattice import Cells, Spacing, default_spacing
+from ..space.lattice import Spacing, default_spacing
 from ..surface import Mask, Surface, metric
-from ..surface.bounds import Bounds, as_bounds
+from ..surface.bounds import Bounds, Cells, as_bounds
 from ..validation import Point, PointLike, as_point, require_not_negative
 from .path import Path
 
 if TYPE_CHECKING:
     from ..space.constraints import Area, Constraints
-    from ..space.slope_limit import SlopeLimit
+    from ..space.slope_limit import SlopeLimit, SlopeMeasure
 
 
 class Problem:
@@ -32,8 +31,10 @@ class Problem:
     obstacles : shapely polygons and lines, ``Circle`` and ``Mask``, map units. The surface's
     no-data cells are obstacles too. Points are allowed where there is a radius.
     radius : of the vehicle, map units. Obstacles of all kinds are inflated by it, so that no path
-    comes nearer to one. max_slope : degrees. Ground is an obstacle where the first layer, without
-    its weight, is steeper. keep_in : shapely polygon or polygons that the vehicle must not leave.
+    comes nearer to one. max_slope : degrees. Cells are an obstacle where the first layer, without
+    its weight, is steeper. slope_measure : "horn", the slope of a cell as GIS tools compute it, or
+    "steepest", that of the steepest place in it. keep_in : shapely polygon or polygons that the
+    vehicle must not leave.
     name : shown in reports.
 
     ``obstacles`` are those given; ``free_space`` is where the vehicle's centre may be.
@@ -50,6 +51,7 @@ class Problem:
         *,
         radius: float = 0.0,
         max_slope: float | None = None,
+        slope_measure: SlopeMeasure = "horn",
         keep_in: Area | None = None,
         name: str = "",
     ) -> None:
@@ -67,6 +69,7 @@ class Problem:
         self.obstacles: tuple[Obstacle, ...] = given
         self.radius = float(radius)
         self.max_slope = max_slope
+        self.slope_measure = slope_measure
         self.keep_in = keep_in
         self.free_space = self._free_space()
         self.start = self.checked(start, "start")
@@ -101,7 +104,9 @@ class Problem:
         from ..space.slope_limit import SlopeLimit
 
         # Steep ground just beyond the bounds also keeps the vehicle away.
-        return SlopeLimit(self.surface, self.max_slope, self.bounds.widened(self.radius))
+        return SlopeLimit(
+            self.surface, self.max_slope, self.bounds.widened(self.radius), self.slope_measure
+        )
 
     @staticmethod
     def _make_bounds(surface: Surface, bounds: Sequence[float] | None) -> Bounds:
@@ -167,16 +172,24 @@ class Problem:
     def default_spacing(self) -> Spacing:
         """The default spacing of lattice nodes along x1 and x2, map units."""
         finest = [metric.feature_size(self.surface)]
-        finest += [mask.spacing for mask in self.free_space.masks]
+        finest += [Spacing(cells.dx, cells.dy) for cells in self.mask_cells]
         return default_spacing(self.bounds, Spacing(*map(min, zip(*finest, strict=True))))
+
+    @property
+    def mask_cells(self) -> list[Cells]:
+        """The cells of masks. Where steep cells are finer than the map's own, they do not count."""
+        masks = self.free_space.masks
+        if self.surface.native is not None and self.max_slope is not None:
+            given = [obstacle for obstacle in self.obstacles if isinstance(obstacle, Mask)]
+            masks = given if self.surface.nodata is None else [*given, self.surface.nodata]
+        return [_cells_of(mask) for mask in masks]
 
     @property
     def cells(self) -> Cells | None:
         """The smallest cells among those of masks and of the surface; None where there are none."""
-        grids = [_cells_of(mask) for mask in self.free_space.masks]
-        data = self.surface.data
-        if isinstance(data, Spline):
-            grids.append(Cells(data.x0, data.y0, data.dx, data.dy))
+        grids = list(self.mask_cells)
+        if self.surface.cells is not None:
+            grids.append(self.surface.cells)
         return min(grids, key=lambda cells: min(cells.dx, cells.dy), default=None)
 
     @cached_property

@@ -68,7 +68,7 @@ def _load_jacksboro() -> Problem:
         # The file names the northern edge ymin: its rows run from north to south.
         west, east, north, south = (float(archive[k]) for k in ("xmin", "xmax", "ymin", "ymax"))
     raster = Raster.from_extent(heights[None], (west, south, east, north), "EPSG:4326")
-    surface = raster.to_local_metres().to_surface(names=["height"], units=["m"])
+    surface = raster.to_surface(names=["height"], units=["m"])
     assert surface.georeference is not None
     start, goal = surface.georeference.from_map(np.array([JACKSBORO_START, JACKSBORO_GOAL]))
     return Problem(surface, start, goal, name="jacksboro")

@@ -21,6 +21,7 @@ Rectangle: TypeAlias = tuple[float, float, float, float]
 Files: TypeAlias = tuple[str, ...]
 Interval: TypeAlias = tuple[float, float]
 Extent: TypeAlias = float | Literal["auto", "none"]
+SlopeMeasure: TypeAlias = Literal["horn", "steepest"]
 
 # What a value has to be, in words.
 NUMBER, WHOLE, SWITCH, TEXT = "a finite number", "a whole number", "true or false", "text"

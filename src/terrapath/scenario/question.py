@@ -134,6 +134,7 @@ class Question:
             self._obstacles(place.surface),
             radius=limits.radius,
             max_slope=limits.max_slope,
+            slope_measure=limits.slope_measure,
             keep_in=self._area(place.surface, corridor),
             name=place.name,
         )

@@ -21,6 +21,7 @@ from .option import (
     Point,
     Points,
     Rectangle,
+    SlopeMeasure,
     a_count,
     a_file,
     a_number,
@@ -114,6 +115,15 @@ class ConstraintsSection:
         float | None,
         a_number("The steepest ground that may be entered, degrees.", "DEGREES", "25.0"),
     ] = None
+    slope_measure: Annotated[
+        SlopeMeasure,
+        Option(
+            "How steep a cell is: horn, as gdaldem and QGIS compute it [default], or steepest, the "
+            "steepest place of the surface in the cell.",
+            '"horn" or "steepest"',
+            form="horn|steepest",
+        ),
+    ] = "horn"
     keep_in: Annotated[
         str | None,
         a_file(

@@ -11,7 +11,7 @@ import numpy as np
 
 from .._kernels.space.free_space import Grid
 from ..errors import InputError
-from ..surface.bounds import Bounds
+from ..surface.bounds import Bounds, Cells
 from ..validation import Array, require_positive
 
 # By default the region's longer side has this many nodes. Where the surface has finer features it
@@ -20,15 +20,6 @@ NODES_PER_SIDE, MOST_NODES_PER_SIDE = 250.0, 1000.0
 
 # This many nodes can be numbered in 32 bits, and fit in the memory of a large machine.
 MOST_NODES = 2**30
-
-
-class Cells(NamedTuple):
-    """Cells of a map or a mask: the centre of one of them, and their size, map units."""
-
-    x: float
-    y: float
-    dx: float
-    dy: float
 
 
 class Spacing(NamedTuple):

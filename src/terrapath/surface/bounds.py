@@ -59,6 +59,15 @@ class Bounds(NamedTuple):
         )
 
 
+class Cells(NamedTuple):
+    """Cells of a map or a mask: the centre of one of them, and their size, map units."""
+
+    x: float
+    y: float
+    dx: float
+    dy: float
+
+
 def as_bounds(bounds: Sequence[float] | Array, name: str = "bounds") -> Bounds:
     """The rectangle (x1_min, x2_min, x1_max, x2_max), checked to be finite and not empty."""
     try:

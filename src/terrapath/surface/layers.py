@@ -11,6 +11,7 @@ import numpy as np
 
 from .._kernels.surface.cells import NO_CELLS, CostCells
 from .._kernels.surface.surfaces import Peaks, Spline
+from .._support.memory import blocks
 from ..errors import InputError
 from ..validation import Array, require_choice, require_not_negative
 from .bounds import Bounds
@@ -74,6 +75,43 @@ def make_layers(
 def weights_of(layers: Sequence[Layer], kind: Kind | None = None) -> Array:
     """(layers,): their weights; of those of a kind alone where it is given."""
     return np.array([layer.weight for layer in layers if kind in (None, layer.kind)])
+
+
+# A slope above this is not real ground: most often a no-data value that a file does not declare.
+STEEPEST = 1e12
+
+
+def _steepest_of(coefficients: Array, dx: float, dy: float) -> float:
+    """An upper bound on the slope of one spline layer, found block by block."""
+    steepest = 0.0
+    for rows in blocks(*coefficients.shape):
+        block = coefficients[rows.start : rows.stop + 1]
+        along_x = np.abs(np.diff(block, axis=1)).max() / dx
+        along_y = np.abs(np.diff(block, axis=0)).max(initial=0.0) / dy
+        steepest = max(steepest, float(along_x), float(along_y))
+    return steepest
+
+
+def _steepest(data: Peaks | Spline) -> float:
+    """An upper bound on the weighted slope of every layer, layer units/map unit."""
+    with np.errstate(over="ignore"):
+        if isinstance(data, Peaks):
+            amplitude, falloff = np.abs(data.peaks[:, 0]), data.peaks[:, 1]
+            weights = np.repeat(data.weights, np.diff(data.first))
+            slopes = weights * amplitude * np.sqrt(2.0 * falloff / math.e)
+            return float(slopes.max(initial=0.0))
+        slopes = [_steepest_of(layer, data.dx, data.dy) for layer in data.coefficients]
+        return float((data.weights * slopes).max())
+
+
+def require_ground(data: Peaks | Spline) -> None:
+    """Raise InputError where slopes are not those of real ground."""
+    slope = _steepest(data)
+    if not slope <= STEEPEST:
+        raise InputError(
+            f"the surface has slopes of up to {slope:.2g}, over {STEEPEST:g}; check the "
+            "units and the weights, and whether the map declares its no-data value"
+        )
 
 
 # Cost layers: their values multiply lengths

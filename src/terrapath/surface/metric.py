@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from .._kernels.surface import lengths
 from .._kernels.surface.points import fill_metric
-from .._kernels.surface.surfaces import Peaks
 from ..errors import InputError
 from ..validation import Array, as_points
 from . import Surface
@@ -157,8 +156,8 @@ def is_rough(surface: Surface, bounds: Bounds) -> bool:
 
 def feature_size(surface: Surface) -> tuple[float, float]:
     """The size of the surface's finest features along x1 and x2, map units."""
-    data, size = surface.data, surface.resolution
-    if isinstance(data, Peaks) or math.isinf(size):
+    cells, size = surface.cells, surface.resolution
+    if cells is None or math.isinf(size):
         return size, size
-    shorter = min(data.dx, data.dy)
-    return size * (data.dx / shorter), size * (data.dy / shorter)
+    shorter = min(cells.dx, cells.dy)
+    return size * (cells.dx / shorter), size * (cells.dy / shorter)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ from .surface import Surface
 
 if TYPE_CHECKING:
     from .holes import Cells
+    from .layers import Kind
 
 
 SAME_PLACE = 1e-6  # places that differ by less count as equal, cells
@@ -85,15 +86,15 @@ class Grid:
     def reach(self, length: float) -> tuple[int, int]:
         """The largest numbers of rows and columns that a length on the plane reaches across."""
         columns, rows = np.meshgrid([0, self.columns - 1], [0, self.rows - 1])
-        corner = self._on_plane(columns, rows)
+        corner = self.on_plane(columns, rows)
         steps = ((columns, rows + 1), (columns + 1, rows))
-        sides = [np.hypot(*(self._on_plane(*step) - corner)).min() for step in steps]
+        sides = [np.hypot(*(self.on_plane(*step) - corner)).min() for step in steps]
         return math.ceil(length / sides[0]), math.ceil(length / sides[1])
 
-    def _on_plane(self, columns: Array, rows: Array) -> Array:
+    def on_plane(self, columns: Array, rows: Array) -> Array:
         """(2, ...): where corners of cells lie on the planning plane."""
         x, y = self.place(columns, rows)
-        plane = self._plane()
+        plane = self.plane
         if self.crs is not None and plane is not None and plane != self.crs:
             x, y = transformer(self.crs, plane).transform(x, y)
         return np.asarray([x, y])
@@ -180,7 +181,8 @@ class Grid:
         y: Array = t.f + t.e * (np.arange(self.rows, dtype=np.float64) + 0.5)
         return x, y
 
-    def _plane(self) -> CRS | None:
+    @cached_property
+    def plane(self) -> CRS | None:
         """The planning CRS: the grid's own where it is true to scale, else a local projection."""
         if self.crs is None or not self._needs_projection:
             return self.crs
@@ -217,19 +219,26 @@ class Grid:
         """The grid to plan on: upright, rows from south to north; this grid's cells if possible."""
         if not self.needs_warp:
             return self.southward()
-        from rasterio.warp import calculate_default_transform
 
-        plane = self._plane()
-        source_crs = self.crs.to_wkt() if self.crs else 'LOCAL_CS["plane"]'
-        plane_crs = plane.to_wkt() if plane else source_crs
-        try:
-            transform, columns, rows = calculate_default_transform(
-                source_crs, plane_crs, self.columns, self.rows, *self.extent()
-            )
-        except Exception as error:  # rasterio passes on GDAL's own types of error
-            reason = str(error).split("\n")[0]
-            raise MapError(f"the map cannot be brought onto a plane: {reason}") from None
-        return Grid(rows, columns, transform, plane, self.map_crs or self.crs).southward()
+        from .plane import grid_on_plane
+
+        return grid_on_plane(self)
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """The sides of a cell on the planning plane, along its rows and its columns."""
+        if not self.needs_warp:
+            return abs(self.transform.a), abs(self.transform.e)
+
+        from .plane import sides_on_plane
+
+        return sides_on_plane(self)
+
+    def in_cells(self, rows: int, columns: int) -> Grid:
+        """The same ground in another number of rows and columns."""
+        t, across, along = self.transform, self.columns / columns, self.rows / rows
+        transform = Affine(t.a * across, t.b * along, t.c, t.d * across, t.e * along, t.f)
+        return replace(self, rows=rows, columns=columns, transform=transform)
 
 
 LEAST_CELLS = 4
@@ -272,25 +281,6 @@ class Raster:
         """Is it in degrees, rotated or distorted, so that it must be warped before planning?"""
         return self.grid.needs_warp
 
-    def to_local_metres(self) -> Raster:
-        """The same ground on a north-up grid of square cells in a projected CRS (cubic)."""
-        from .resampling import resample
-
-        target = self.grid.planning_grid()
-        bands = np.empty((len(self.bands), target.rows, target.columns))
-        for band, out in zip(self.bands, bands, strict=True):
-            resample(np.array(band, dtype=np.float64), self.grid, target, out, linear=False)
-        return Raster.on(target, bands).trimmed()
-
-    def trimmed(self) -> Raster:
-        """The raster without outer rows and columns that hold no data at all."""
-        some = ~self._missing()
-        if not some.any():
-            return self
-        rows, columns = (np.flatnonzero(some.any(axis=axis)) for axis in (1, 0))
-        kept = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-        return Raster.on(self.grid.window(*kept), self.bands[:, kept[0], kept[1]])
-
     def _missing(self) -> Cells:
         """Cells where any layer has no data."""
         from .holes import missing_cells
@@ -301,11 +291,12 @@ class Raster:
         return missing
 
     def _georeference(self) -> Georeference | None:
-        return None if self.crs is None else Georeference(self.crs, self.map_crs or self.crs)
+        plane = self.grid.plane
+        return None if plane is None else Georeference(plane, self.map_crs or self.crs or plane)
 
     def _southward(self) -> Raster:
         """The raster with rows from south to north."""
-        if self.transform.e > 0.0:
+        if self.transform.e > 0.0 or not self.grid.is_upright:
             return self
         return Raster.on(self.grid.flipped(), self.bands[:, ::-1])
 
@@ -322,7 +313,7 @@ class Raster:
                 f"a surface needs at least {LEAST_CELLS} x {LEAST_CELLS}"
             )
 
-    def _fill(self, size: float, kinds: Sequence[str]) -> Mask | None:
+    def _fill(self, size: float, kinds: Sequence[Kind]) -> Cells | None:
         """Fill small holes, and continue the ground into large ones; returns the blocked cells.
 
         Costs are filled in their logarithms. They stay within their range, and so above 0.
@@ -340,13 +331,13 @@ class Raster:
                 np.log(band, out=band)
             low, high = np.nanmin(band), np.nanmax(band)
             if size > 0.0:
-                fill_small_holes(band, missing, self.transform.a, self.transform.e, size)
+                fill_small_holes(band, missing, *self.grid.sides, size)
                 np.clip(band, low, high, out=band)
             continue_into_holes(band, missing)
             if kind == "cost":
                 np.exp(np.clip(band, low, high, out=band), out=band)
             blocked |= missing
-        return Mask(blocked, *self.grid.centres()) if blocked.any() else None
+        return blocked if blocked.any() else None
 
     def to_surface(
         self,
@@ -354,36 +345,40 @@ class Raster:
         names: Sequence[str],
         units: Sequence[str] | None = None,
         weights: Sequence[float] | None = None,
-        kinds: Sequence[str] | None = None,
+        kinds: Sequence[Kind] | None = None,
         fill_holes: float = 0.0,
         smoothing: float | None = None,
     ) -> Surface:
         """The spline surface through the cell centres; cells without data are blocked.
 
-        kinds : "rise" or "cost" for each layer. fill_holes : holes up to this side are filled and
+        kinds : of each layer, as in ``Surface.from_grid``. fill_holes : holes up to this side are filled and
         become free, map units.
         Do not use the raster after this: its cells without data are given values.
         """
         raster = self._southward()
         raster._require_cells()
         kinds = kinds or ["rise"] * len(names)
-        nodata = None if raster.is_complete else raster._fill(fill_holes, kinds)
-        x, y = raster.grid.centres()
+        missing = None if raster.is_complete else raster._fill(fill_holes, kinds)
+        make = partial(
+            Surface.from_grid,
+            smoothing=smoothing,
+            names=names,
+            units=units,
+            weights=weights,
+            kinds=kinds,
+            georeference=raster._georeference(),
+        )
         try:
-            return Surface.from_grid(
-                raster.bands,
-                x,
-                y,
-                smoothing=smoothing,
-                names=names,
-                units=units,
-                weights=weights,
-                kinds=kinds,
-                nodata=nodata,
-                georeference=raster._georeference(),
-            )
+            if raster.needs_warp():
+                from .carrying import carried_surface
+
+                return carried_surface(raster, kinds, missing, make)
+            x, y = raster.grid.centres()
+            nodata = None if missing is None else Mask(missing, x, y)
+            return make(raster.bands, x, y, nodata=nodata)
         except MemoryError:
+            rows, columns = raster.bands.shape[1:]
             raise InputError(
-                f"a map of {len(x):,} x {len(y):,} cells needs more memory than there is; read a "
+                f"a map of {columns:,} x {rows:,} cells needs more memory than there is; read a "
                 "part of it (within) or every few cells only (decimate)"
             ) from None

@@ -10,9 +10,9 @@ from .._support.memory import blocks
 from ..errors import MapError
 from ..validation import Array
 from .fitting import interpolate
-from .georeference import transformer
 from .holes import continue_into_holes, missing_cells
 from .neighbours import bilinear
+from .places import Places
 from .raster import SAME_PLACE, Grid
 
 LEAST_FOR_SPLINE = 4  # cells on a side that a spline needs
@@ -37,20 +37,6 @@ def _spline_at(spline: Spline, column: Array, row: Array, shape: tuple[int, int]
     return inside[:, 0]
 
 
-def _source_cells(source: Grid, target: Grid, rows: slice) -> tuple[Array, Array]:
-    """Where the centres of some rows of the target lie in the source: (column, row)."""
-    column, row = np.meshgrid(
-        np.arange(target.columns) + 0.5, np.arange(rows.start, rows.stop) + 0.5
-    )
-    x, y = target.place(column.ravel(), row.ravel())
-    if source.crs is not None and target.crs is not None and source.crs != target.crs:
-        x, y = transformer(target.crs, source.crs).transform(x, y)
-        if source.crs.is_geographic:  # any longitude is also one 360 degrees on
-            west, _, east, _ = source.extent()
-            x = x + 360.0 * np.rint((0.5 * (west + east) - x) / 360.0)
-    return source.cells(x, y)
-
-
 def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: bool) -> None:
     """Resample values (rows, columns) of one grid to another, into ``out``; NaN is no-data.
 
@@ -66,8 +52,9 @@ def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: b
     linear = linear or min(values.shape) < LEAST_FOR_SPLINE
     spline = None if linear else _spline_through(values)
     last = np.array(values.shape) - 1
+    places = Places(source, target)
     for rows in blocks(target.rows, target.columns):
-        column, row = _source_cells(source, target, rows)
+        column, row = places.of_rows(rows)
         with np.errstate(invalid="ignore"):
             inside = (np.abs(column - 0.5 * last[1]) <= 0.5 * last[1] + 0.5 + SAME_PLACE) & (
                 np.abs(row - 0.5 * last[0]) <= 0.5 * last[0] + 0.5 + SAME_PLACE
@@ -83,7 +70,7 @@ def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: b
         sampled[missing[nearest[0], nearest[1]]] = np.nan
         block = np.full(inside.shape, np.nan)
         block[inside] = sampled
-        out[rows] = block.reshape(-1, target.columns)
+        out[rows] = block
 
 
 def require_overlap(name: str, source: Grid, target: Grid) -> None:

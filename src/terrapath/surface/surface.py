@@ -14,16 +14,24 @@ import numpy.typing as npt
 from .._kernels.surface.points import fill_cell_costs, fill_jets, fill_log_costs, fill_values
 from .._kernels.surface.surfaces import Peaks, Spline
 from .._support.extras import require_packages
-from .._support.memory import blocks
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import Array, as_array, as_points, require_not_negative, require_positive
-from .bounds import Bounds, Mask, as_bounds
+from .bounds import Bounds, Cells, Mask, as_bounds
 from .costs import CellLayers, cost_cells, cost_values_at, fit_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
-from .layers import Layer, make_layers, require_cost_range, typical_cost, weights_of, with_costs
+from .layers import (
+    Layer,
+    make_layers,
+    require_cost_range,
+    require_ground,
+    typical_cost,
+    weights_of,
+    with_costs,
+)
 
 if TYPE_CHECKING:
+    from .carrying import Native
     from .smoothing import Smoothing
 
 
@@ -45,33 +53,6 @@ class Fit:
         if self.gradient_error is not None:
             text += f", gradient error {self.gradient_error:.2g}"
         return text if self.smoothing is None else f"{text}; {self.smoothing}"
-
-
-# A slope above this is not real ground: most often a no-data value that a file does not declare.
-STEEPEST = 1e12
-
-
-def _steepest_of(coefficients: Array, dx: float, dy: float) -> float:
-    """An upper bound on the slope of one spline layer, found block by block."""
-    steepest = 0.0
-    for rows in blocks(*coefficients.shape):
-        block = coefficients[rows.start : rows.stop + 1]
-        along_x = np.abs(np.diff(block, axis=1)).max() / dx
-        along_y = np.abs(np.diff(block, axis=0)).max(initial=0.0) / dy
-        steepest = max(steepest, float(along_x), float(along_y))
-    return steepest
-
-
-def _steepest(data: Peaks | Spline) -> float:
-    """An upper bound on the weighted slope of every layer, layer units/map unit."""
-    with np.errstate(over="ignore"):
-        if isinstance(data, Peaks):
-            amplitude, falloff = np.abs(data.peaks[:, 0]), data.peaks[:, 1]
-            weights = np.repeat(data.weights, np.diff(data.first))
-            slopes = weights * amplitude * np.sqrt(2.0 * falloff / math.e)
-            return float(slopes.max(initial=0.0))
-        slopes = [_steepest_of(layer, data.dx, data.dy) for layer in data.coefficients]
-        return float((data.weights * slopes).max())
 
 
 def _scale_of(smoothing: float | None, bounds: Bounds) -> float:
@@ -105,14 +86,11 @@ class Surface:
     cost_data: Spline | None = None  # the logarithms of the smooth ones, before their weights
     cost_cells: CellLayers | None = None  # those that are constant in cells
     source: str = ""  # the map that it was read from
+    is_raster: bool = False  # was it made of a grid, whose cells have slopes of their own?
+    native: Native | None = None  # the map's own cells, where it was carried over from them
 
     def __post_init__(self) -> None:
-        steepest = _steepest(self.data)
-        if not steepest <= STEEPEST:
-            raise InputError(
-                f"the surface has slopes of up to {steepest:.2g}, over {STEEPEST:g}; check the "
-                "units and the weights, and whether the map declares its no-data value"
-            )
+        require_ground(self.data)
         require_cost_range(self.data)
 
     # Constructors
@@ -210,7 +188,8 @@ class Surface:
         spacing = float(min(np.diff(x).max(), np.diff(y).max()))
         resolution = spacing if fitted.smoothing is None else fitted.smoothing.resolution(spacing)
         data = with_costs(fitted.spline, logs, cost_cells(cells, costs))
-        return cls(data, rises, bounds, fit, resolution, nodata, georeference, costs, logs, cells)
+        made_of = (rises, bounds, fit, resolution, nodata, georeference, costs, logs, cells)
+        return cls(data, *made_of, is_raster=True)
 
     @classmethod
     def from_function(
@@ -313,6 +292,16 @@ class Surface:
     def unit(self) -> str:
         """Unit of lengths on the plane; empty where it is not known."""
         return "" if self.georeference is None else self.georeference.unit
+
+    @property
+    def cells(self) -> Cells | None:
+        """The cells of the map, else of the spline; None for exact peaks."""
+        if self.native is not None:
+            x, y = self.native.plane.centres()
+            return Cells(float(x[0]), float(y[0]), *self.native.plane.sides)
+        if not isinstance(self.data, Spline):
+            return None
+        return Cells(self.data.x0, self.data.y0, self.data.dx, self.data.dy)
 
     def _points(self, points: npt.ArrayLike) -> tuple[Array, tuple[int, ...]]:
         array = as_points(points)

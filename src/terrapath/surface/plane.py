@@ -1,0 +1,54 @@
+"""The cells of the planning plane for a map that lies in degrees, turned or distorted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from rasterio import Affine
+
+from ..validation import Array
+from .raster import SAME_PLACE, Grid
+
+OUTLINE = 33  # places on each side of a map at which it is looked where it lies on the plane
+
+
+def grid_on_plane(grid: Grid) -> Grid:
+    """An upright grid over all of a map, with cells that are nowhere wider than the map's own.
+
+    So no row and no column of the map is lost on the plane.
+    """
+    corners = np.meshgrid(*(np.linspace(0.0, n, OUTLINE) for n in (grid.columns, grid.rows)))
+    x, y = grid.on_plane(*corners)
+    known = np.isfinite(x) & np.isfinite(y)
+    west, east, south, north = x[known].min(), x[known].max(), y[known].min(), y[known].max()
+    sides = sides_on_plane(grid)
+    dx, dy = sides[::-1] if _is_turned(grid) else sides
+    columns = math.ceil((east - west) / dx - SAME_PLACE)
+    rows = math.ceil((north - south) / dy - SAME_PLACE)
+    transform = Affine(dx, 0.0, float(west), 0.0, dy, float(south))
+    return Grid(rows, columns, transform, grid.plane, grid.map_crs or grid.crs)
+
+
+def sides_on_plane(grid: Grid) -> tuple[float, float]:
+    """The least sides of a map's cells on the plane, along its rows and along its columns."""
+    along, across = (float(np.nanmin(np.hypot(*step))) for step in steps_on_plane(grid))
+    return along, across
+
+
+def _is_turned(grid: Grid) -> bool:
+    """Do a map's rows run along y rather than along x?"""
+    along, _ = steps_on_plane(grid)
+    return bool(np.nansum(np.abs(along[0])) < np.nansum(np.abs(along[1])))
+
+
+def steps_on_plane(grid: Grid) -> tuple[Array, Array]:
+    """How x and y of the plane change from a map's column and from its row to the next.
+
+    Each (2, m, m), at places all over the map.
+    """
+    column, row = np.meshgrid(
+        *(np.linspace(0.5, n - 0.5, OUTLINE) for n in (grid.columns, grid.rows))
+    )
+    along = grid.on_plane(column + 0.5, row) - grid.on_plane(column - 0.5, row)
+    return along, grid.on_plane(column, row + 0.5) - grid.on_plane(column, row - 0.5)
