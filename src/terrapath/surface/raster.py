@@ -351,8 +351,8 @@ class Raster:
     ) -> Surface:
         """The spline surface through the cell centres; cells without data are blocked.
 
-        kinds : of each layer, as in ``Surface.from_grid``. fill_holes : holes up to this side are filled and
-        become free, map units.
+        kinds : of each layer, as in ``Surface.from_grid``. fill_holes : holes up to this side are
+        filled and become free, map units.
         Do not use the raster after this: its cells without data are given values.
         """
         raster = self._southward()
