@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TypeGuard
@@ -11,7 +12,7 @@ from typing import TypeGuard
 import numpy as np
 import numpy.typing as npt
 
-from .errors import InputError
+from .errors import InputError, MapError
 
 Array = npt.NDArray[np.float64]
 Point = tuple[float, float]
@@ -118,6 +119,18 @@ def require_choice(choices: tuple[str, ...], **values: object) -> None:
     for name, value in values.items():
         if value not in choices:
             raise InputError(f"{name}={value!r} is not known; choose one of {', '.join(choices)}")
+
+
+def require_no_pipe(path: Path) -> None:
+    """Raise MapError for a pipe or a device, which would be waited for, or read without an end."""
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return  # whoever opens it says why it cannot be
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise MapError(
+            f"{path} is a pipe or a device, and no file; write what comes out of it to a file first"
+        )
 
 
 def is_there(path: Path) -> bool:

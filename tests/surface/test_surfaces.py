@@ -433,12 +433,46 @@ def test_one_expression_need_not_be_in_a_list():
         ([""], "''"),
         ([], "empty"),
         (["I*x1"], "I*x1"),
+        (["sqrt(-1)*x1"], "not a real formula"),
+        (["__import__('os').getpid() + x1"], "no number, operator or known function"),
+        (["x1.__class__"], "no number, operator or known function"),
+        (["[x1][0]"], "no number, operator or known function"),
+        (["(lambda: x1)()"], "no number, operator or known function"),
+        (["x1 if x2 else 1"], "no number, operator or known function"),
+        (["eval('x1')"], "'eval' is none of them"),
+        (["factorial(10**9)"], "'factorial' is none of them"),
+        (["9**9**9**9*x1"], "digits"),
+        (["9" * 5000 + "*x1"], "5000"),
+        (["-" * 9000 + "x1"], "nested too deeply"),
+        (["x1" + " + x1" * 9000], "letters"),
     ],
 )
 def test_expressions_that_are_not_formulas_in_x1_and_x2_are_refused(expressions, shown):
     with pytest.raises(tp.InputError) as caught:
         tp.Surface.from_expression(expressions, (0, 0, 1, 1))
     assert shown in one_line(caught)
+
+
+def test_an_expression_runs_no_code(tmp_path):
+    made = tmp_path / "made"
+    for text in (f"open({str(made)!r}, 'w')", f"x1 + __import__('pathlib').Path({str(made)!r})"):
+        with pytest.raises(tp.InputError):
+            tp.Surface.from_expression([text], (0, 0, 1, 1))
+    assert not made.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("abs(x1 - 0.5)**3", 0.5**3),
+        ("Max(x1, 0.25)/2", 0.5),
+        ("-E*x1 + pi/4 - 1e-3", np.pi / 4 - np.e - 1e-3),
+        ("2**x1 * atan2(x2, x1) + cos(1/3)", np.cos(1 / 3)),
+    ],
+)
+def test_expressions_have_numbers_operators_and_functions(text, value):
+    surface = tp.Surface.from_expression([text], (0.75, 0, 1, 1), 1e-3)
+    assert surface.values((1.0, 0.0))[0] == pytest.approx(value, abs=2e-3)
 
 
 def test_an_expression_that_is_not_defined_everywhere_is_an_error_and_not_a_warning():

@@ -21,7 +21,7 @@ from .._support.watching import MustStop, never
 from ..errors import CertificateError, MapError
 from ..problem import Problem
 from ..surface.bounds import as_bounds
-from ..validation import as_array
+from ..validation import as_array, require_no_pipe
 from .claims import Claim, Core, Needs, proven_claim, require_proven, require_sound
 
 
@@ -98,6 +98,7 @@ class Certificate(Claim):
 
         Raises MapError for a file that is missing, or of another kind.
         """
+        require_no_pipe(FilePath(path))
         try:
             # Opened here, because NumPy does not close a file that it cannot read.
             with FilePath(path).open("rb") as source, np.load(source, allow_pickle=False) as file:

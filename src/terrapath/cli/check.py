@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from ..scenario.scenario import Given, assembled
+from ..scenario.scenario import Given
 from .console import ExitCode, compiling_announced
-from .options import Where, with_options
+from .options import Where, asked, with_options
 
 
 @with_options("map", "route", "constraints", without=["route_all_goals"])
@@ -35,7 +35,7 @@ def check_command(
     from ..scenario.answers import check
     from .report import print_check
 
-    scenario = assembled(where, given)
+    scenario = asked(where, given)
     loaded = Certificate.load(certificate)
     started = time.perf_counter()
     with compiling_announced():

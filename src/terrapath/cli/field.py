@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from ..scenario.outputs import FieldOutputs
-from ..scenario.scenario import Given, assembled
+from ..scenario.scenario import Given
 from .console import ExitCode, compiling_announced
-from .options import Where, with_options
+from .options import Where, asked, with_options
 
 
 @with_options(
@@ -39,7 +39,7 @@ def field_command(
     are used. Exit codes: 0 done, 2 bad input, 5 standard output is closed or full (all files
     are written), 130 interrupted (nothing is written).
     """
-    scenario = assembled(where, given)
+    scenario = asked(where, given)
     outputs = FieldOutputs(output or [], plot)
     outputs.check(scenario.inputs())
     from ..scenario.answers import field as field_of

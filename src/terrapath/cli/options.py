@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any
 
@@ -10,7 +11,15 @@ import typer
 
 from ..errors import InputError
 from ..scenario.option import Declared, Extent, Files, Point, Points, Rectangle
-from ..scenario.scenario import Given, LayerTable, LayerTables, Weights, options
+from ..scenario.scenario import (
+    Given,
+    LayerTable,
+    LayerTables,
+    Scenario,
+    Weights,
+    assembled,
+    options,
+)
 
 Where = Annotated[
     str,
@@ -149,6 +158,22 @@ def _taken(sections: Iterable[str], also: Iterable[str], without: Iterable[str])
         and (declaration.section in sections or declaration.parameter in named)
         and declaration.parameter not in left_out
     ]
+
+
+def asked(where: str, given: Given) -> Scenario:
+    """The scenario that is asked for; on a terminal, leave is asked where its file reaches out."""
+    try:
+        return assembled(where, given)
+    except InputError as error:
+        from ..scenario.toml import ExternalError
+
+        is_terminal = all(stream and stream.isatty() for stream in (sys.stdin, sys.stderr))
+        if not (isinstance(error, ExternalError) and is_terminal):
+            raise
+        if not typer.confirm(f"terrapath: {error}. Go on?", err=True):
+            raise
+        allowed = {**given.get("map", {}), "allow_external": True}
+        return assembled(where, {**given, "map": allowed})
 
 
 def with_options(

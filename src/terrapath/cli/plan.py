@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ..scenario.scenario import Given, assembled
+from ..scenario.scenario import Given
 from .console import ExitCode, compiling_announced, progress_bar
-from .options import Where, with_options
+from .options import Where, asked, with_options
 
 if TYPE_CHECKING:
     from ..problem import Solution
@@ -26,7 +26,7 @@ def plan_command(where: Where, given: Given) -> int:
     """
     from ..scenario.answers import answer
 
-    scenario = assembled(where, given)
+    scenario = asked(where, given)
     quiet = scenario.output.quiet or scenario.output.json
     with compiling_announced(quiet), progress_bar(quiet) as watch:
         answered = answer(scenario, watch=watch)

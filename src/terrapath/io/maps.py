@@ -128,7 +128,8 @@ class OpenMap:
     def _opened(self, name: str, kind: Kind, source: LayerSource) -> Part:
         from .alignment import placed
 
-        band, grid = source.open(self.files), self.heights.band.grid
+        band = source.open(self.files, self.unsaid, heights=False)
+        grid = self.heights.band.grid
         if self.unsaid.is_local:
             band = replace(band, grid=replace(band.grid, crs=None))
         return Part(name, kind, source.weight, placed(name, band, grid, self.unsaid.crs))
@@ -172,6 +173,7 @@ def open_map(
     height_unit: str | None = None,
     cell_size: float | None = None,
     height_range: tuple[float, float] | None = None,
+    allow_external: bool = False,
 ) -> Iterator[OpenMap]:
     """Open a map, to count its cells and to read surfaces of it: of the whole, in part, coarser.
 
@@ -180,7 +182,9 @@ def open_map(
     the remedy.
     """
     require_not_negative(fill_holes=fill_holes)
-    unsaid = Unsaid.of(crs, nodata, height_unit, cell_size, height_range)
+    unsaid = Unsaid.of(
+        crs, nodata, height_unit, cell_size, height_range, allow_external=allow_external
+    )
     files = ExitStack()
     opened = None
     try:
@@ -270,6 +274,7 @@ def read_surface(
     height_unit: str | None = None,
     cell_size: float | None = None,
     height_range: tuple[float, float] | None = None,
+    allow_external: bool = False,
     within: Rectangle | None = None,
     margin: float = 0.0,
     decimate: int = 1,
@@ -291,7 +296,8 @@ def read_surface(
     such, with a MapWarning; "none": only what it declares; or a further value. height_unit : of
     heights that have none, "m" or "ft". cell_size : the side of the cells of a picture, which
     does not say it. height_range : (low, high), the heights of a picture's darkest and brightest
-    numbers. within : (x_min, y_min, x_max, y_max) in the map's own
+    numbers. allow_external : a virtual raster (VRT) may take its data from outside its folder.
+    within : (x_min, y_min, x_max, y_max) in the map's own
     coordinates; only this part is read. margin : how much more is read around it, map units of
     the plane. A vehicle's radius reaches over the edge, and ground that is not read cannot block
     it. decimate : means over blocks of this many cells a side are read. most_cells : a map with
@@ -313,6 +319,7 @@ def read_surface(
         height_unit=height_unit,
         cell_size=cell_size,
         height_range=height_range,
+        allow_external=allow_external,
     ) as opened:
         return opened.surface(
             within=within, margin=margin, decimate=decimate, most_cells=most_cells

@@ -15,7 +15,7 @@ from rasterio import Affine
 
 from ..errors import InputError, MapError, MapWarning, tell
 from ..surface.georeference import LENGTH_UNITS, metres_of, parse_crs
-from ..validation import Array, require_not_negative, require_positive
+from ..validation import Array, require_no_pipe, require_not_negative, require_positive
 from .bands import Band
 from .rasters import open_band, reading
 
@@ -29,6 +29,8 @@ Source: TypeAlias = Union[
     str, Path, "DataArray", "Dataset", "tuple[ArrayLike, ArrayLike, ArrayLike]"
 ]
 
+# How text begins that says where the data are, instead of holding them.
+DESCRIBES = re.compile(rb"<(VRT|OGRVRT|GDAL_W|WCS_GDAL|GDALTileIndex)")
 NETCDF_ENDINGS = (".nc", ".nc4", ".cdf", ".netcdf")
 
 _TEXT = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?", re.DOTALL)
@@ -87,13 +89,15 @@ class LayerSource:
             "LayerSource"
         )
 
-    def open(self, files: ExitStack, unsaid: Unsaid | None = None) -> Band:
+    def open(self, files: ExitStack, unsaid: Unsaid, *, heights: bool = True) -> Band:
         """Open the band; its file stays open until ``files`` is closed.
 
-        unsaid : what is said about a map of heights; None for other layers.
+        unsaid : what is said about the map of heights. heights : is this it?
         """
-        band = self._opened(files, unsaid or Unsaid(), heights=unsaid is not None)
-        return band if unsaid is None else unsaid.applied_to(band)
+        if heights:
+            return unsaid.applied_to(self._opened(files, unsaid, heights=True))
+        alone = Unsaid(allow_external=unsaid.allow_external)
+        return self._opened(files, alone, heights=False)
 
     def _opened(self, files: ExitStack, unsaid: Unsaid, *, heights: bool) -> Band:
         crs = unsaid.crs
@@ -103,7 +107,8 @@ class LayerSource:
             )
         if not isinstance(self.path, (str, Path)):
             return _band_of_array(self.path, self.band, crs)
-        if may_be_netcdf(self.path):
+        beginning = require_safe(self.path, allow_external=unsaid.allow_external)
+        if may_be_netcdf(self.path, beginning):
             from .netcdf import netcdf
 
             if (named := netcdf(self.path)) is not None:
@@ -118,16 +123,42 @@ class LayerSource:
         )
 
 
-def may_be_netcdf(path: str | Path) -> bool:
-    """Is it worth a look whether a name is of a netCDF file?"""
+def may_be_netcdf(path: str | Path, beginning: bytes) -> bool:
+    """Is it worth a look whether a name is of a netCDF file? beginning : the file's."""
     text = str(path).lower()
-    if text.startswith("netcdf:") or text.endswith(NETCDF_ENDINGS):
-        return True
+    return (
+        beginning.startswith(b"CDF") or text.startswith("netcdf:") or text.endswith(NETCDF_ENDINGS)
+    )
+
+
+def require_safe(name: str | Path, *, allow_external: bool) -> bytes:
+    """The first bytes of a file, b"" where a name is of something else.
+
+    Raises MapError for a pipe, an archive that is too large, and a file that takes its data from
+    outside its folder without leave.
+    """
+    path = Path(name)
+    require_no_pipe(path)
+    text = str(name)
+    if ":" in text:
+        for part in re.split(r'[:"]', text):
+            require_no_pipe(Path(part or "."))
+    if "zip" in text.lower():
+        from .._support.external import archive_of, require_moderate_archive
+
+        archive = archive_of(text)
+        if archive is not None:
+            require_moderate_archive(archive)
     try:
-        with Path(path).open("rb") as file:
-            return file.read(3) == b"CDF"
+        with path.open("rb") as file:
+            beginning = file.read(1024)
     except (OSError, ValueError):
-        return False
+        return b""
+    if DESCRIBES.search(beginning) and not allow_external:
+        from .._support.external import require_no_reach
+
+        require_no_reach(path, beginning)
+    return beginning
 
 
 def _as_path(text: str) -> Path | str:
@@ -204,6 +235,7 @@ class Unsaid:
     crs : the CRS of a map that has none. is_local : no CRS is looked for. no_data : see ``NoData``.
     height_unit : of heights that have none. cell_size : the side of the cells of a picture.
     height_range : the heights that a picture's darkest and brightest numbers stand for.
+    allow_external : the files may take their data from outside their folders.
     """
 
     crs: CRS | None = None
@@ -212,6 +244,7 @@ class Unsaid:
     height_unit: str = ""
     cell_size: float | None = None
     height_range: tuple[float, float] | None = None
+    allow_external: bool = False
 
     @classmethod
     def of(
@@ -221,6 +254,8 @@ class Unsaid:
         height_unit: str | None,
         cell_size: float | None,
         height_range: tuple[float, float] | None,
+        *,
+        allow_external: bool = False,
     ) -> Unsaid:
         """From the arguments of ``read_surface``, checked."""
         is_local = isinstance(crs, str) and crs.lower() == LOCAL
@@ -238,6 +273,7 @@ class Unsaid:
             height_unit=height_unit or "",
             cell_size=cell_size,
             height_range=None if height_range is None else _as_range(height_range),
+            allow_external=allow_external,
         )
 
     def applied_to(self, band: Band) -> Band:

@@ -70,6 +70,7 @@ def open_question(scenario: Scenario) -> Iterator[Question]:
         height_unit=place.height_unit,
         cell_size=place.cell_size,
         height_range=place.height_range,
+        allow_external=place.allow_external,
     ) as opened:
         yield Question(scenario, opened)
 
@@ -145,7 +146,12 @@ class Question:
             return []
         from ..io import read_obstacles
 
-        return [shape for file in files for shape in read_obstacles(file, surface)]
+        allowed = self.scenario.map.allow_external
+        return [
+            shape
+            for file in files
+            for shape in read_obstacles(file, surface, allow_external=allowed)
+        ]
 
     def _area(self, surface: Surface, corridor: Corridor | None) -> BaseGeometry | None:
         """The area that the route may not leave; None where there is no such area."""
@@ -153,7 +159,7 @@ class Question:
         if file is not None:
             from ..io import read_area
 
-            area = read_area(file, surface)
+            area = read_area(file, surface, allow_external=self.scenario.map.allow_external)
         if corridor is None:
             return area
         around = corridor.area_on(surface)

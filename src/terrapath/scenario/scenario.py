@@ -21,6 +21,7 @@ from .option import (
     Option,
     a_file,
     a_number,
+    a_switch,
     declared,
 )
 from .sections import ConstraintsSection, OutputSection, PlannerSection, RouteSection
@@ -125,6 +126,14 @@ class MapSection:
             example="[0.0, 120.0]",
         ),
     ] = None
+    allow_external: Annotated[
+        bool,
+        a_switch(
+            "Let a scenario name files outside its folder, and virtual files take their data from "
+            "there or from the network. Not in a scenario file, from which it protects.",
+            "--allow-external/--no-allow-external",
+        ),
+    ] = False
     layers: Annotated[
         LayerTables,
         Option(
@@ -255,7 +264,7 @@ def assembled(where: str, given: Given) -> Scenario:
 
     given : checked values by section and key. Raises InputError for a name no file can have.
     """
-    scenario = _at(where).overridden(given)
+    scenario = _at(where, given).overridden(given)
     for file in scenario.files():
         _require_name(Path(file))
     return scenario
@@ -270,12 +279,13 @@ def _require_name(path: Path) -> None:
         raise InputError(f"{str(path)[:60]!r} cannot be a file: {reason}; check the path") from None
 
 
-def _at(where: str) -> Scenario:
+def _at(where: str, given: Given) -> Scenario:
     ending = Path(where).suffix.lower()
     if ending == ".toml":
         from .toml import read_scenario
 
-        return read_scenario(where)
+        is_allowed = bool(given.get("map", {}).get("allow_external"))
+        return read_scenario(where, None if is_allowed else given)
     if not ending:  # names of scenes have none
         from ..problem.scenes import SCENES
 

@@ -67,8 +67,10 @@ def _of_scene(name: str) -> str:
 
 def _of_map(where: str, file: Path, crs: str | None) -> str:
     from ..io.maps import open_map
+    from ..io.sources import require_safe
 
     require_map(where)
+    require_safe(where, allow_external=False)
     bands = _bands(where)
     height = _height_band(bands)
     with open_map(where, height_band=height, crs=crs) as opened:
@@ -184,7 +186,7 @@ def _template(values: Values, what: str, bands: list[str]) -> str:
     for section, kind in SECTIONS.items():
         lines += ["", "", f"# {kind.__doc__}", f"[{section}]"]
         entries = list(options(section))
-        plain = [entry for entry in entries if not _is_table(entry)]
+        plain = [e for e in entries if not (_is_table(e) or e.key == "allow_external")]
         for entry in plain:
             lines += ["", *_entry(entry, values.get((section, entry.key)))]
         for entry in entries:

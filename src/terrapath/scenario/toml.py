@@ -15,7 +15,8 @@ from typing import Any
 from ..errors import InputError
 from ..validation import is_there
 from .checked import WrongValueError, validated
-from .scenario import Scenario, options
+from .option import Declared
+from .scenario import Given, Scenario, options
 
 # A scenario is one or two pages long; a file larger than this is something else.
 MOST_BYTES = 1_000_000
@@ -27,9 +28,10 @@ class ScenarioError(InputError):
     """A scenario file that cannot be used."""
 
 
-def read_scenario(path: str | Path) -> Scenario:
+def read_scenario(path: str | Path, given: Given | None = None) -> Scenario:
     """The scenario in a TOML file; paths in it are relative to the file's folder.
 
+    given : what the user gives besides, and so allows; None where the file may reach anywhere.
     Raises ScenarioError with the file, the line, the key, its value and what is expected.
     """
     file = Path(path)
@@ -42,6 +44,11 @@ def read_scenario(path: str | Path) -> Scenario:
         raise ScenarioError(f"{file} is not valid TOML: {error}") from None
     scenario = _validated(data, text, file)
     _require_one_map(scenario, text, file)
+    if scenario.map.allow_external:
+        reason = "allow_external is for the user to give, not for a file; leave it out"
+        raise _error(file, text, ("map", "allow_external"), reason)
+    if given is not None:
+        _require_inside(scenario, file, given)
     return _resolved(scenario, file.parent)
 
 
@@ -85,7 +92,44 @@ def _require_one_map(scenario: Scenario, text: str, file: Path) -> None:
         raise _error(file, text, ("map",), reason)
 
 
+class ExternalError(ScenarioError):
+    """A scenario file that names files outside its folder, without leave."""
+
+
 # Paths
+
+
+def _require_inside(scenario: Scenario, file: Path, given: Given) -> None:
+    """Raise ExternalError where a scenario from a file reaches out of its folder.
+
+    given : what the user gives instead of the file's values, and so allows.
+    """
+    from .._support.external import ALLOW, is_inside, reaches_out
+
+    for entry in options():
+        if entry.key in given.get(entry.section, {}):
+            continue
+        is_output = entry.section == "output"
+        for name in _names_of(entry, getattr(getattr(scenario, entry.section), entry.key)):
+            if is_output and not is_inside(str(file.parent / name), file.parent):
+                what = "writes to", "outside its folder"
+            elif not is_output and reaches_out(name, file.parent):
+                what = "reads", "which is elsewhere"
+            else:
+                continue
+            raise ExternalError(
+                f"{file} {what[0]} {name!r:.200}, {what[1]}; allow that by {ALLOW}, or give the "
+                "file yourself"
+            )
+
+
+def _names_of(entry: Declared, value: object) -> list[str]:
+    """The files that the value of an option names."""
+    if isinstance(value, dict) and entry.key in {"layers", "costs"}:
+        return [table.file for table in value.values()]
+    if not entry.option.is_file or not value:
+        return []
+    return list(value) if isinstance(value, tuple) else [str(value)]
 
 
 def _resolved(scenario: Scenario, folder: Path) -> Scenario:

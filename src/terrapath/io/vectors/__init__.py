@@ -14,7 +14,9 @@ from .layers import read_layers
 from .plane import Plane, Where, placed
 
 
-def read_obstacles(path: str | Path, where: Where) -> list[BaseGeometry]:
+def read_obstacles(
+    path: str | Path, where: Where, *, allow_external: bool = False
+) -> list[BaseGeometry]:
     """The geometries of a vector file on the planning plane, one for each feature.
 
     path : a vector file that GDAL reads, in any CRS, for all its layers; or ``FILE:LAYER`` for one
@@ -23,11 +25,15 @@ def read_obstacles(path: str | Path, where: Where) -> list[BaseGeometry]:
     surface, only geometries within one side of the map around it are kept.
     Polygons that cross themselves are repaired (RepairedWarning). A VectorWarning tells of
     features without geometry, which are left out; of a file without a CRS, which is taken to be
-    in the map's own coordinates; and of obstacles outside the map.
+    in the map's own coordinates; of obstacles outside the map; and of a file without any.
+    allow_external : the file may take its data from outside its folder, as an OGR VRT can.
     Raises MapError with the file, the reason and the remedy.
     """
     source, plane = Path(path), Plane.of(where)
-    layers = list(read_layers(source))
+    layers = list(read_layers(source, allow_external=allow_external))
+    if not layers:
+        tell(VectorWarning(f"{source} is empty: it holds no obstacles"))
+        return []
     shapes = [shape for layer in layers for shape in placed(layer, plane)]
     if plane.bounds is not None:
         count = sum(len(layer.shapes) for layer in layers)
@@ -35,7 +41,7 @@ def read_obstacles(path: str | Path, where: Where) -> list[BaseGeometry]:
     return shapes
 
 
-def read_area(path: str | Path, where: Where) -> BaseGeometry:
+def read_area(path: str | Path, where: Where, *, allow_external: bool = False) -> BaseGeometry:
     """The polygons of a vector file, as one area on the plane; otherwise as ``read_obstacles``.
 
     Raises MapError also where the file holds geometries other than polygons, or where the area
@@ -43,7 +49,8 @@ def read_area(path: str | Path, where: Where) -> BaseGeometry:
     """
     source, plane = Path(path), Plane.of(where)
     polygons: list[BaseGeometry] = []
-    for layer in read_layers(source):
+    layers = list(read_layers(source, allow_external=allow_external))
+    for layer in layers:
         for number, shape in zip(layer.numbers, layer.shapes, strict=True):
             if shape.geom_type not in {"Polygon", "MultiPolygon"}:
                 raise MapError(
@@ -51,6 +58,8 @@ def read_area(path: str | Path, where: Where) -> BaseGeometry:
                     "area; give polygons"
                 )
         polygons += placed(layer, plane)
+    if not layers:
+        raise MapError(f"{source} is empty: it holds no area; give a file of polygons")
     area = shapely.union_all(polygons)
     if area.is_empty or (plane.bounds and not shapely.intersects(area, shapely.box(*plane.bounds))):
         raise MapError(f"{source}: the area lies outside the map; check its CRS and the axis order")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -17,10 +16,12 @@ from shapely.geometry.base import BaseGeometry
 from ..._support.extras import require_packages
 from ...errors import MapError, RepairedWarning, VectorWarning, silence, tell
 from ...space.free_space import Geometries, Indices, simple_parts
-from ...validation import is_there
+from ...validation import is_there, require_no_pipe
 
 FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30
+MOST_TO_KNOW_GML = 4096  # bytes in which GML names its namespace
+PACKED = (".gz", ".zip")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,43 +35,83 @@ class Layer:
     numbers: Indices  # (m,)
 
 
-def read_layers(path: Path) -> Iterator[Layer]:
-    """The layers of a file that hold geometries, checked and repaired."""
-    source, names = _listed(path)
+def read_layers(path: Path, *, allow_external: bool = False) -> Iterator[Layer]:
+    """The layers of a file that hold geometries, checked and repaired; none for an empty file.
+
+    allow_external : the file may take its data from outside its folder.
+    """
+    source, wanted = _found(path)
+    _require_safe(source, allow_external=allow_external)
+    require_packages(f"reading {source}", "pyogrio")
+    names, count = _listed(source, wanted)
+    data = _content(source)
     layers = [
         layer
         for name in names
-        for layer in [_read_layer(source, name, alone=len(names) == 1)]
+        for layer in [_read_layer(source, data, name, alone=len(names) == 1)]
         if layer is not None
     ]
-    if not layers:
+    if count and not layers:
         raise MapError(f"{path} holds no features with a geometry; check that it is the right file")
     yield from map(repaired, layers)
 
 
-def _listed(path: Path) -> tuple[Path, list[str]]:
-    """The file, and the names of the layers to read."""
-    source, wanted = path, ""
-    if not is_there(path):
-        file, _, wanted = str(path).rpartition(":")
-        source = Path(file)
-        if not file or not is_there(source):
-            raise MapError(f"{path} does not exist; check the path")
+def _found(path: Path) -> tuple[Path, str]:
+    """The file, and the name of its layer that is wanted, "" for all."""
+    if is_there(path):
+        return path, ""
+    file, _, wanted = str(path).rpartition(":")
+    if not file or not is_there(Path(file)):
+        raise MapError(f"{path} does not exist; check the path")
+    return Path(file), wanted
+
+
+def _require_safe(source: Path, *, allow_external: bool) -> None:
+    """Raise MapError for a pipe, what is too large, and what reaches outside without leave."""
+    require_no_pipe(source)
     _refuse_absurd_sizes(source)
-    require_packages(f"reading {source}", "pyogrio")
+    if allow_external or not source.is_file():
+        return
+    from ..._support.external import require_no_reach
+
+    with quietly(source), source.open("rb") as file:
+        beginning = file.read(1024)
+    require_no_reach(source, beginning)
+
+
+def _content(source: Path) -> Path | bytes:
+    """The file; its bytes where GDAL would leave another file (.gfs) beside it."""
+    if not source.is_file():
+        return source
+    with source.open("rb") as file:
+        is_gml = b"opengis.net/gml" in file.read(MOST_TO_KNOW_GML)
+    return source.read_bytes() if is_gml and source.suffix.lower() not in PACKED else source
+
+
+def _listed(source: Path, wanted: str) -> tuple[list[str], int]:
+    """The names of the layers to read, and how many features all layers have."""
     import pyogrio
 
+    data = _content(source)
     with quietly(source):
-        known = [(str(name), kind) for name, kind in pyogrio.list_layers(source)]
+        known = [(str(name), kind) for name, kind in pyogrio.list_layers(data)]
     if wanted:
         if wanted not in {name for name, _ in known}:
             listed = ", ".join(name for name, _ in known)
             raise MapError(f"{source} has no layer {wanted!r}; its layers are: {listed}")
-        return source, [wanted]
+        return [wanted], _count(data, source, wanted)
     with_geometry = [name for name, kind in known if kind is not None]
-    if not with_geometry:
+    count = sum(_count(data, source, name) for name, _ in known)
+    if count and not with_geometry:
         raise MapError(f"{source} holds no layer with geometries; give a file of polygons or lines")
-    return source, with_geometry
+    return with_geometry, count
+
+
+def _count(data: Path | bytes, source: Path, layer: str) -> int:
+    import pyogrio
+
+    with quietly(source):
+        return int(pyogrio.read_info(data, layer=layer, force_feature_count=True)["features"])
 
 
 def _refuse_absurd_sizes(path: Path) -> None:
@@ -78,19 +119,19 @@ def _refuse_absurd_sizes(path: Path) -> None:
 
     A zip archive counts with its unpacked size.
     """
+    from ..._support.external import require_moderate_archive
+
     try:
         files = [p for p in path.glob("*") if p.is_file()] if path.is_dir() else [path]
         size = sum(file.stat().st_size for file in files)
-        if path.is_file() and zipfile.is_zipfile(path):
-            with zipfile.ZipFile(path) as archive:
-                size = sum(item.file_size for item in archive.infolist())
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+    except (OSError, ValueError) as error:
         raise MapError(f"{path} cannot be read: {reason_of(error)}") from None
     if size > MOST_BYTES:
         raise MapError(
             f"{path} holds {size / 2**30:,.1f} GiB, more than {MOST_BYTES / 2**30:g} GiB; "
             "cut out the part around the map"
         )
+    require_moderate_archive(path)
 
 
 @contextmanager
@@ -116,17 +157,17 @@ def reason_of(error: Exception) -> str:
     return text.split("; ")[0][:200]
 
 
-def _read_layer(path: Path, name: str, *, alone: bool) -> Layer | None:
+def _read_layer(path: Path, data: Path | bytes, name: str, *, alone: bool) -> Layer | None:
     """One layer, with those features that have a geometry; None where no feature has one."""
     import pyogrio
 
     label = str(path) if alone else f"{path}:{name}"
     with quietly(path):
         driver = pyogrio.read_info(
-            path, layer=name, force_feature_count=False, force_total_bounds=False
+            data, layer=name, force_feature_count=False, force_total_bounds=False
         ).get("driver", "")
         about, ids, packed, _ = pyogrio.raw.read(
-            path, layer=name, columns=[], force_2d=True, return_fids=True
+            data, layer=name, columns=[], force_2d=True, return_fids=True
         )
         shapes = np.empty(0, np.object_) if packed is None else shapely.from_wkb(packed)
     crs = _parsed(about["crs"], label)
