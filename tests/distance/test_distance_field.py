@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 import terrapath as tp
 from common import FLAT, REGION, fitted_order, points_in
 from planner_oracles import visibility_length
-from terrapath._kernels.distance import descent
+from terrapath._kernels.distance import descent, edges, star
 from terrapath.distance.medium import Medium
 from terrapath.problem import scenes
 
@@ -394,3 +394,23 @@ def test_on_steep_noise_distances_are_above_zero(seed):
     at_source = field.values == 0.0
     assert at_source.sum() == 1
     assert (field.values[~at_source] > 0.0).all()
+
+
+@pytest.mark.parametrize("weight", [0.3, 10.0])
+def test_edges_cost_the_same_four_at_once_as_by_themselves(weight, monkeypatch):
+    random = np.random.default_rng(4)
+    costs = random.uniform(0.5, 2.0, (60, 60))
+    surface = tp.Surface.from_grid(
+        np.array([ROUGH["fractal"], 3.0 * ROUGH["fractal"].T, costs]),
+        AXIS,
+        AXIS,
+        kinds=["rise", "rise", "cost"],
+        weights=[weight, weight, 1.0],
+    )
+    lattice = tp.Lattice.spanning(surface.bounds, 7.0)
+    medium = Medium(surface, lattice, tp.Problem(surface, (50.0, 50.0), (60.0, 60.0)).free_space)
+    tails, directions, found = star.list_edges(medium.stars)
+    assert len(set(directions.tolist())) > 8
+    for n, k in zip(tails, directions, strict=True):
+        edges.write_single(medium.ground, lattice.nx, n, k, medium.stars)
+    assert (star.list_edges(medium.stars)[2] == found).all()

@@ -5,7 +5,18 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from terrapath._kernels.compiler import kernel
-from terrapath._kernels.vec4 import exp, four, four_in_row, fused, sqrt, total
+from terrapath._kernels.vec4 import (
+    any_above,
+    exp,
+    four,
+    four_entries,
+    four_in_row,
+    fused,
+    larger,
+    sqrt,
+    total,
+    where_above,
+)
 
 numbers = st.floats(-1e6, 1e6)
 fours = st.tuples(numbers, numbers, numbers, numbers)
@@ -90,3 +101,35 @@ def test_four_in_a_row_are_read_and_numbers_stay_numbers():
     found = rows(array, 2, 3, 1, out)
     np.testing.assert_array_equal(out, array[2, 3, 1:5])
     assert found == pytest.approx((np.e, np.sqrt(2.0)), rel=1e-15)
+
+
+@kernel
+def compare(a, b, out):
+    v, w = four(a[0], a[1], a[2], a[3]), four(b[0], b[1], b[2], b[3])
+    put(v / w, out[0])
+    put(larger(v, w), out[1])
+    put(where_above(v, w, 1.0, v), out[2])
+    out[3, 0], out[3, 1] = larger(a[0], b[0]), where_above(a[0], b[0], 1.0, a[0])
+    return any_above(v, w), any_above(a[0], b[0])
+
+
+@given(fours, st.tuples(*[st.floats(0.5, 1e6)] * 4))
+@settings(max_examples=50, deadline=None)
+def test_four_numbers_are_compared_one_by_one(a, b):
+    a, b, out = np.array(a), np.array(b), np.zeros((4, 4))
+    for function in (compare, plain(compare)):
+        assert function(a, b, out) == ((a > b).any(), a[0] > b[0])
+        assert (out[:3] == [a / b, np.maximum(a, b), np.where(a > b, 1.0, a)]).all()
+        assert (out[3, :2] == out[1:3, 0]).all()
+
+
+@kernel
+def pick(values, k, j, i, steps, out):
+    put(four_entries(values, k, j, i, steps[0], steps[1], steps[2]), out)
+
+
+def test_four_entries_anywhere_are_read():
+    values, out = np.arange(60.0).reshape(2, 5, 6), np.zeros(4)
+    for function in (pick, plain(pick)):
+        function(values, 1, 2, 3, (-7, 5, 0), out)
+        assert out.tolist() == [45.0, 38.0, 50.0, 45.0]

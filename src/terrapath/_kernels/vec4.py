@@ -2,7 +2,7 @@
 
 LLVM turns loops over arrays into vector instructions, but neither a sum over the sixteen
 coefficients of a spline nor an exponential in the middle of a formula. In Python each function
-here runs as it is written; ``_lowered_by`` gives the compiler the instructions that replace it.
+here runs as it is written; ``lowered_by`` gives the compiler the instructions that replace it.
 A number beside a ``Four`` stands for four equal numbers. IEEE 754 defines every operation on a
 ``Four``, and their order is fixed, so the bits are the same on every processor.
 """
@@ -17,7 +17,9 @@ from numba.core import cgutils
 from numba.core.datamodel import models, register_default
 from numba.core.imputils import lower_builtin, lower_cast
 from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing.templates import signature
+
+from .lowering import lowered_by
 
 _DOUBLE, _LANE = ir.DoubleType(), ir.IntType(32)
 _VECTOR, _BITS = ir.VectorType(_DOUBLE, 4), ir.VectorType(ir.IntType(64), 4)
@@ -53,23 +55,6 @@ def _splat(context, builder, kind, _, number):
     return builder.shuffle_vector(first, ir.Constant(_VECTOR, ir.Undefined), places)
 
 
-def _lowered_by(build, resolve, *kinds):
-    """Compile calls of a function by ``build``, for the argument types that ``resolve`` takes."""
-
-    def declare(function):
-        class Template(AbstractTemplate):
-            key = function
-
-            def generic(self, args, kws):
-                return resolve(*args)
-
-        infer_global(function, types.Function(Template))
-        lower_builtin(function, *kinds)(build)
-        return function
-
-    return declare
-
-
 def _all_four(*args):
     """A ``Four`` is returned, and all arguments become one, where any argument is one."""
     return signature(_FOUR, *[_FOUR] * len(args)) if _FOUR in args else None
@@ -86,8 +71,9 @@ for _operator, _instruction in {
     operator.add: "fadd",
     operator.sub: "fsub",
     operator.mul: "fmul",
+    operator.truediv: "fdiv",
 }.items():
-    _lowered_by(_arithmetic(_instruction), _all_four, FourType, FourType)(_operator)
+    lowered_by(_arithmetic(_instruction), _all_four, FourType, FourType)(_operator)
 
 
 def _lane(context, builder, signature, args):
@@ -99,7 +85,7 @@ def _lane_of(four, lane):
     return signature(types.float64, four, types.intp) if is_lane else None
 
 
-_lowered_by(_lane, _lane_of, FourType, types.intp)(operator.getitem)
+lowered_by(_lane, _lane_of, FourType, types.intp)(operator.getitem)
 
 
 # Functions
@@ -112,7 +98,7 @@ def _put_together(context, builder, signature, args):
     return vector
 
 
-@_lowered_by(
+@lowered_by(
     _put_together,
     lambda *args: signature(_FOUR, *[types.float64] * 4),
     *[types.float64] * 4,
@@ -132,7 +118,7 @@ def _load(context, builder, signature, args):
     return builder.load(builder.bitcast(first, _VECTOR.as_pointer()), align=8)
 
 
-@_lowered_by(
+@lowered_by(
     _load,
     lambda array, *_: signature(_FOUR, array, *[types.intp] * 3),
     types.Array,
@@ -141,6 +127,35 @@ def _load(context, builder, signature, args):
 def four_in_row(array, k, j, i):
     """The four entries of a float64 array (., ., .) from (k, j, i) on."""
     return array[k, j, i : i + 4]
+
+
+def _load_with(context, builder, signature, args):
+    array = context.make_array(signature.args[0])(context, builder, args[0])
+    shape = cgutils.unpack_tuple(builder, array.shape, 3)
+    strides = cgutils.unpack_tuple(builder, array.strides, 3)
+    first = cgutils.get_item_pointer2(
+        context, builder, array.data, shape, strides, signature.args[0].layout, args[1:4]
+    )
+    vector = builder.insert_element(
+        ir.Constant(_VECTOR, ir.Undefined), builder.load(first), _LANE(0)
+    )
+    for lane, offset in enumerate(args[4:], start=1):
+        vector = builder.insert_element(
+            vector, builder.load(builder.gep(first, [offset])), _LANE(lane)
+        )
+    return vector
+
+
+@lowered_by(
+    _load_with,
+    lambda array, *_: signature(_FOUR, array, *[types.intp] * 6),
+    types.Array,
+    *[types.intp] * 6,
+)
+def four_entries(array, k, j, i, a, b, c):
+    """Four entries of a float64 array (., ., .) in C order: (k, j, i), and those a, b, c after."""
+    place = np.ravel_multi_index((k, j, i), array.shape)
+    return array.ravel()[[place, place + a, place + b, place + c]]
 
 
 def _intrinsic(builder, name, *args):
@@ -160,7 +175,7 @@ def _fused(context, builder, signature, args):
     return _fma(builder, *args)
 
 
-@_lowered_by(_fused, _all_four, FourType, FourType, FourType)
+@lowered_by(_fused, _all_four, FourType, FourType, FourType)
 def fused(a, b, c):
     """The sum a b + c; rounded once where it is compiled."""
     return a * b + c
@@ -175,7 +190,7 @@ def _total(context, builder, signature, args):
     return builder.fadd(*(builder.extract_element(pair, _LANE(lane)) for lane in range(2)))
 
 
-@_lowered_by(_total, lambda v: signature(types.float64, _FOUR), FourType)
+@lowered_by(_total, lambda v: signature(types.float64, _FOUR), FourType)
 def total(v):
     """The sum of the four: (first + third) + (second + fourth)."""
     return (v[0] + v[2]) + (v[1] + v[3])
@@ -192,9 +207,60 @@ def _of_number_or_four(build):
 
     def declare(function):
         lower_builtin(function, FourType)(build)
-        return _lowered_by(build, resolve, types.float64)(function)
+        return lowered_by(build, resolve, types.float64)(function)
 
     return declare
+
+
+def _of_numbers_or_fours(build, count, answer=None):
+    """Compile calls of a function of so many numbers, or fours, by ``build``.
+
+    answer : the type that is returned; that of the arguments where it is None.
+    """
+
+    def resolve(*args):
+        kind = _FOUR if _FOUR in args else types.float64
+        return signature(answer or kind, *[kind] * count)
+
+    def declare(function):
+        lower_builtin(function, *[FourType] * count)(build)
+        return lowered_by(build, resolve, *[types.float64] * count)(function)
+
+    return declare
+
+
+def _where_above(context, builder, signature, args):
+    return builder.select(builder.fcmp_ordered(">", *args[:2]), *args[2:])
+
+
+@_of_numbers_or_fours(_where_above, 4)
+def where_above(x, limit, a, b):
+    """The number a where x is above the limit, else b."""
+    return np.where(x > limit, a, b)[()]
+
+
+def _larger(context, builder, signature, args):
+    return builder.select(builder.fcmp_ordered(">", *args), *args)
+
+
+@_of_numbers_or_fours(_larger, 2)
+def larger(a, b):
+    """The larger of two numbers."""
+    return np.where(a > b, a, b)[()]
+
+
+def _any_above(context, builder, signature, args):
+    above = builder.fcmp_ordered(">", *args)
+    if signature.args[0] != _FOUR:
+        return above
+    bits = ir.IntType(4)
+    return builder.icmp_unsigned("!=", builder.bitcast(above, bits), bits(0))
+
+
+@_of_numbers_or_fours(_any_above, 2, types.boolean)
+def any_above(x, limit):
+    """Is the number, or any of the four, above the limit?"""
+    return bool(np.any(x > limit))
 
 
 # Cody and Waite (1980): e^x = 2^n e^r with n = round(x / log 2), so that |r| <= (log 2) / 2;

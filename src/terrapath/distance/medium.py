@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.distance import calendar_queue, ground, hopf_lax, star
+from .._kernels.distance import bellman, calendar_queue, edges, ground, hopf_lax, star
 from .._kernels.space.free_space import Grid
 from .._kernels.surface.cells import NO_CELLS, CostCells
 from .._kernels.surface.metric_rows import columns_of, fill_samples
 from .._kernels.surface.surfaces import Spline
+from .._support.side_by_side import on_all_cores
 from .._support.watching import MustStop, WatchCount, never
 from ..errors import InputError
 from ..space.free_space import FreeSpace
@@ -24,12 +25,15 @@ from ..validation import Array, PointLike
 # Nodes settled between two checks of the callback and of Ctrl-C.
 CHUNK = 20_000
 
-# The edges of all nodes are numbered in 31 bits; on the steepest ground a node has 64.
-MOST_NODES = (2**31 - 1) // (2 * star.HALF)
+# The edges of all nodes are numbered in 31 bits; on the steepest ground 28 a node.
+MOST_NODES = (2**31 - 1) // star.HALF
 
 # Nodes within this distance of the source, in nodes, are seeds: a straight path leads there. It is
 # the length of the longest edge, so that no segment of a star lies beyond the source.
 SEED_RADIUS = 5.9
+
+# Nodes whose values differ by less than this share of the least edge are settled in any order.
+DAY_SHARE = 0.1
 
 # A path along edges begins at a node within this distance of the goal, in nodes.
 REACH = 3.0
@@ -65,8 +69,10 @@ class Medium:
         self.surface, self.lattice, self.free_space = surface, lattice, free_space
         self.ground = _sample(surface, lattice)
         self.stars = _lay_stars(self.ground, lattice, free_space, must_stop)
+        costs = [self.stars.base, self.stars.others]
+        self.least_edge = min(float(cost.min(initial=math.inf)) for cost in costs)
         per = 2 * self.ground.pieces
-        self.data = hopf_lax.Medium(
+        self.data = bellman.Medium(
             self.ground,
             np.stack([z[::per, ::per].ravel() for z in self.ground.heights], axis=-1),
             self.stars,
@@ -74,6 +80,7 @@ class Medium:
             (per * np.abs(star.DIRECTIONS).max(axis=1) <= self.ground.reach).astype(np.uint8),
             free_space.data,
             lattice.data,
+            1.0 / lattice.nx,
             free_space.has_obstacles,
         )
 
@@ -91,8 +98,8 @@ class Medium:
         stops the march.
         """
         lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
-        begin = hopf_lax.Source(*self._place(source), lift_of(self.surface, source))
-        state = hopf_lax.State(
+        begin = bellman.Source(*self._place(source), lift_of(self.surface, source))
+        state = bellman.State(
             tau=np.full(count, math.inf),
             best=np.full(count, hopf_lax.SEED, np.uint8),
             queued=np.zeros(count, np.uint8),
@@ -100,12 +107,16 @@ class Medium:
             links=np.zeros(count, calendar_queue.LINK),
         )
         seeds, values = self._seeds(source, SEED_RADIUS)
-        front = calendar_queue.front_of(lattice.data, self.surface.typical_cost, values)
+        day = calendar_queue.typical_day(lattice.data, self.surface.typical_cost)
+        in_order = DAY_SHARE * self.least_edge <= day
+        if not in_order:
+            day = DAY_SHARE * self.least_edge
+        front = calendar_queue.front_of(count, day, values)
         state.tau[seeds] = float(self.surface.cost(np.asarray(source)))
         hopf_lax.plant(front, state, seeds, values)
         settled, chunk = 0, CHUNK
         while chunk == CHUNK:
-            chunk = hopf_lax.march(self.data, front, state, begin, CHUNK, float(limit))
+            chunk = hopf_lax.march(self.data, front, state, begin, CHUNK, float(limit), in_order)
             settled += chunk
             if watch is not None and watch(settled):
                 break
@@ -147,13 +158,12 @@ class Medium:
 
         count = self.lattice.nx * self.lattice.ny
         beside, values = self._seeds(source, SEED_RADIUS)
-        tails = np.repeat(np.arange(count), np.diff(self.stars.first))
-        heads = tails + self.data.steps[self.stars.directions]
+        tails, directions, costs = star.list_edges(self.stars)
+        heads = tails + self.data.steps[directions]
         # The source is one more node.
         pairs = (np.append(tails, np.full(len(beside), count)), np.append(heads, beside))
-        costs = np.append(self.stars.costs, values)
-        graph = csr_array((costs, pairs), shape=(count + 1, count + 1))
-        values, before = dijkstra(graph, indices=count, return_predecessors=True)
+        graph = csr_array((np.append(costs, values), pairs), shape=(count + 1, count + 1))
+        values, before = dijkstra(graph, directed=False, indices=count, return_predecessors=True)
         return EdgeTree(values, before)
 
     def along_edges(self, tree: EdgeTree, goal: Array) -> npt.NDArray[np.int64] | None:
@@ -214,35 +224,44 @@ def _lay_stars(
             f"the lattice has {lattice.nx:,} x {lattice.ny:,} nodes, more than {MOST_NODES:,} in "
             "all; give a wider spacing"
         )
-    ahead, back = np.zeros(count, np.uint32), np.zeros(count, np.uint32)
-    parts = _parts(lattice)
-    for rows in parts:
+    parts, (ahead, back) = _parts(lattice), star.base_edges(lattice.nx, lattice.ny)
+
+    def choose(rows: tuple[int, int]) -> None:
         star.choose_edges(samples, lattice.nx, lattice.ny, rows, ahead, back)
-        if must_stop():
-            return _no_stars(count)
-    for rows in parts if free_space.has_obstacles else ():
+
+    def cut(rows: tuple[int, int]) -> None:
         star.cut_edges(free_space.data, lattice.data, rows, ahead, back)
-        if must_stop():
-            return _no_stars(count)
-    first = np.zeros(count + 1, np.int32)
-    star.count_edges(ahead, back, first)
-    edges = int(first[-1])
-    stars = star.Stars(first, np.empty(edges, np.uint8), np.empty(edges, np.float32))
-    for rows in parts:
-        star.lay_edges(samples, lattice.nx, rows, ahead, back, stars)
-        if must_stop():
-            return _no_stars(count)
-    return stars
+
+    # Both change edges that lead to rows beside theirs, so no two parts side by side at a time.
+    for change in (choose, cut) if free_space.has_obstacles else (choose,):
+        for some in (parts[::2], parts[1::2]):
+            if not on_all_cores(change, some, must_stop):
+                return _no_stars(count)
+    first = np.empty(count, np.int32)
+    others = np.empty(star.count_others(ahead, first), np.float32)
+    base = np.full((count, 4), np.inf, np.float32)
+    stars = star.Stars(ahead, back, base, first, others)
+
+    def lay(rows: tuple[int, int]) -> None:
+        waiting, counts = np.zeros((star.HALF, 3), edges.WAITING), np.zeros(star.HALF, np.int64)
+        edges.lay_edges(samples, lattice.nx, lattice.ny, rows, stars, waiting, counts)
+
+    return stars if on_all_cores(lay, parts, must_stop) else _no_stars(count)
 
 
 def _parts(lattice: Lattice) -> list[tuple[int, int]]:
-    """The rows of a lattice in parts of about CHUNK nodes, each as its first row and its end."""
-    step = max(CHUNK // lattice.nx, 1)
+    """The rows of a lattice in parts of about CHUNK nodes, each as its first row and its end.
+
+    No edge leads from a part beyond the ones beside it.
+    """
+    step = max(CHUNK // lattice.nx, 2 * star.FARTHEST)
     return [(row, min(row + step, lattice.ny)) for row in range(0, lattice.ny, step)]
 
 
 def _no_stars(count: int) -> star.Stars:
-    return star.Stars(np.zeros(count + 1, np.int32), np.empty(0, np.uint8), np.empty(0, np.float32))
+    none = np.zeros(count, np.uint32)
+    costs = np.full((count, 4), np.inf, np.float32)
+    return star.Stars(none, none, costs, np.zeros(count, np.int32), np.empty(0, np.float32))
 
 
 def lift_of(surface: Surface, point: PointLike) -> Array:

@@ -30,18 +30,24 @@ class Front(NamedTuple):
     counters: np.ndarray  # (2,) int64: QUEUED, DAY
 
 
-# The width of a bucket: this many spacings of nodes, divided by the nodes of a side.
+# The width of a typical day: this many spacings of nodes, divided by the nodes of a side.
 BUCKET_SHARE = 4.0
 BUCKETS = 2**14
 
 
-def front_of(grid: Grid, cost: float, values: np.ndarray) -> Front:
-    """An empty queue for the nodes of a grid, that begins on the day of the least of the values.
+def typical_day(grid: Grid, cost: float) -> float:
+    """The width of a day in which one or two nodes are queued.
 
-    cost : a typical factor on lengths. values : of the nodes that will be queued first, map units.
+    cost : a typical factor on lengths.
     """
-    count = grid.nx * grid.ny
-    width = BUCKET_SHARE * math.sqrt(grid.dx * grid.dy) / max(grid.nx, grid.ny) * cost
+    return BUCKET_SHARE * math.sqrt(grid.dx * grid.dy) / max(grid.nx, grid.ny) * cost
+
+
+def front_of(count: int, width: float, values: np.ndarray) -> Front:
+    """An empty queue for so many nodes, that begins on the day of the least of the values.
+
+    width : of a day, map units. values : of the nodes that will be queued first, map units.
+    """
     front = Front(
         u=np.full(count, np.inf),
         trial=np.full(count, np.inf),
@@ -68,11 +74,18 @@ def day_of(front, value):
 
 
 @inner_kernel
+def list_of(front, value):
+    """The bucket in which a value is listed from now on.
+
+    A second-order value can be a little greater than a value that follows from it: that belongs to
+    a day that has passed, so it is listed in the current one.
+    """
+    return max(day_of(front, value), front.counters[DAY]) & (front.heads.shape[0] - 1)
+
+
+@inner_kernel
 def enqueue(nodes, front, n, value):
-    # A second-order value can be a little greater than a value that follows from it: that belongs
-    # to a day that has passed, so it is listed in the current one.
-    day = max(day_of(front, value), front.counters[DAY])
-    bucket = day & (front.heads.shape[0] - 1)
+    bucket = list_of(front, value)
     head = front.heads[bucket]
     front.trial[n] = value
     front.heads[bucket] = n
@@ -120,15 +133,26 @@ def least_of_day(nodes, front, day):
 
 
 @inner_kernel
-def least(nodes, front):
-    """The node with the least trial value; the queue must not be empty."""
+def any_of_day(nodes, front, day):
+    """A node with a trial value up to the end of a day, -1 where there is none."""
+    n = front.heads[day & (front.heads.shape[0] - 1)]
+    while n >= 0 and day_of(front, front.trial[n]) > day:
+        n = nodes[n].after
+    return n
+
+
+@inner_kernel
+def earliest(nodes, front, in_order):
+    """A node of the earliest day, the one with the least value where they come in order; the
+    queue must not be empty.
+    """
     day = front.counters[DAY]
     last = day + front.heads.shape[0]
-    n = least_of_day(nodes, front, day)
+    n = least_of_day(nodes, front, day) if in_order else any_of_day(nodes, front, day)
     while n < 0:
         day += 1
         if day == last:  # no node in a whole round of buckets: skip the empty days
             day = earliest_day(nodes, front)
-        n = least_of_day(nodes, front, day)
+        n = least_of_day(nodes, front, day) if in_order else any_of_day(nodes, front, day)
     front.counters[DAY] = day
     return n

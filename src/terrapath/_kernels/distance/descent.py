@@ -24,7 +24,7 @@ from ..surface.surfaces import (
     spot_at,
 )
 from .cubic import first_node, interpolate
-from .ground import surface_ray
+from .surface_ray import surface_ray
 
 
 class Field(NamedTuple):

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
-from .calendar_queue import QUEUED, dequeue, enqueue, least
+from .calendar_queue import QUEUED, dequeue, earliest, enqueue
 from .stencils import (
     ALL_LINKS,
     ALL_SIDES,
@@ -314,7 +314,7 @@ def march(nodes, front, dependents, source, nx, most, limit):
     for settled in range(most):
         if front.counters[QUEUED] == 0:
             return settled
-        n = least(nodes, front)
+        n = earliest(nodes, front, True)
         if front.trial[n] > limit:
             return settled
         dequeue(nodes, front, n)

@@ -16,17 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
+from ..dispatch import per_class
 from ..surface.cells import CostCells, any_cells, mean_in_cells
-from ..surface.surfaces import (
-    floor_of,
-    has_cells,
-    log_cost_at,
-    mean_cell_cost,
-    slope_at,
-    spot_at,
-    squared_cost_at,
-)
-from ..vec4 import sqrt
+from ..vec4 import any_above, four, four_entries, larger, sqrt, where_above
 
 
 class Ground(NamedTuple):
@@ -40,6 +32,27 @@ class Ground(NamedTuple):
     reach: float  # a longer line is cut into pieces of at most this, in samples
     floor: float  # a lower bound on the costs
     cells: CostCells  # costs that are constant in cells, in samples
+
+
+class FourGrounds(NamedTuple):
+    """The ground as it is seen from four nodes: in place of a sample, kernels get four, each as
+    far from its node as that sample is from the first.
+
+    All that kernels ask for must be on the samples, for each of the nodes, and no costs constant in
+    cells.
+    """
+
+    heights: np.ndarray  # as of Ground
+    costs: np.ndarray
+    dx: float
+    dy: float
+    pieces: int
+    reach: float
+    floor: float
+    cells: CostCells
+    second: int  # the numbers of the other nodes' samples, less that of the first
+    third: int
+    fourth: int
 
 
 class Lift(NamedTuple):
@@ -76,10 +89,49 @@ SLIGHT = 1e-4
 
 
 @inner_kernel
-def flat(vx, vy, wx, wy):
+def seen_from(g, second, third, fourth):
+    """The ground as it is seen from four nodes."""
+    return FourGrounds(
+        g.heights, g.costs, g.dx, g.dy, g.pieces, g.reach, g.floor, g.cells, second, third, fourth
+    )
+
+
+@inner_kernel
+def sample_of_one(ground, values, layer, j, i):
+    return values[layer, j, i]
+
+
+@inner_kernel
+def samples_of_four(ground, values, layer, j, i):
+    return four_entries(values, layer, j, i, ground.second, ground.third, ground.fourth)
+
+
+@inner_kernel
+def zero_of_one(ground):
+    return 0.0
+
+
+@inner_kernel
+def zero_of_four(ground):
+    return four(0.0, 0.0, 0.0, 0.0)
+
+
+@per_class({Ground: sample_of_one, FourGrounds: samples_of_four})
+def sample(ground, values, layer, j, i):
+    """A layer of ``heights`` or ``costs`` at sample (i, j); of the first of four nodes."""
+
+
+@per_class({Ground: zero_of_one, FourGrounds: zero_of_four})
+def zero(ground):
+    """The number 0 where sums begin."""
+
+
+@inner_kernel
+def flat(zero, vx, vy, wx, wy):
     """The sums over the two coordinates of the plane."""
-    vv = vx * vx + vy * vy
-    return Lift(vv, 0.25 * vv, 0.25 * vv, 0.0, 0.0, 0.0, vx * wx + vy * wy, wx * wx + wy * wy)
+    vv = zero + (vx * vx + vy * vy)
+    vw, ww = zero + (vx * wx + vy * wy), zero + (wx * wx + wy * wy)
+    return Lift(vv, 0.25 * vv, 0.25 * vv, zero, zero, zero, vw, ww)
 
 
 @inner_kernel
@@ -105,12 +157,14 @@ def bent(lift):
     chord, sag = sqrt(lift.vv), lift.dd - lift.dv * lift.dv * per
     across = lift.ww - lift.vw * lift.vw * per
     both = lift.dw - lift.dv * lift.vw * per
-    left = max(sag - both * both / across, 0.0) if across > 0.0 else sag
-    if lift.dd <= SLIGHT * lift.vv:
-        return chord * (1.0 + 8.0 / 3.0 * left * per)
+    left = where_above(across, 0.0, larger(sag - both * both / across, 0.0), sag)
+    slightly = chord * (1.0 + 8.0 / 3.0 * left * per)
+    if not any_above(lift.dd, SLIGHT * lift.vv):
+        return slightly
     # The two halves are together at least as long as the chord, but for rounding.
-    excess = max(sqrt(lift.first) + sqrt(lift.second) - chord, 0.0)
-    return chord + 4.0 / 3.0 * excess * (left / sag if sag > 0.0 else 0.0)
+    excess = larger(sqrt(lift.first) + sqrt(lift.second) - chord, 0.0)
+    share = where_above(sag, 0.0, left / sag, 0.0)
+    return where_above(lift.dd, SLIGHT * lift.vv, chord + 4.0 / 3.0 * excess * share, slightly)
 
 
 @inner_kernel
@@ -120,17 +174,16 @@ def mean_cost(lift, c):
     two = 0.5 * (a * (c.begin + c.middle) + b * (c.middle + c.end))
     mean = (4.0 * two - 0.5 * one * (c.begin + c.end)) / (4.0 * (a + b) - one)
     across = lift.ww - lift.vw * lift.vw / lift.vv
-    if not across > 0.0:
-        return mean
     slope = (c.across - (c.end - c.begin) * lift.vw / lift.vv) / c.middle
     saved = slope * slope / across * lift.vv / 24.0
-    return mean * (1.0 - min(saved, MOST_SAVED))
+    saved = where_above(MOST_SAVED, saved, saved, MOST_SAVED)
+    return mean * (1.0 - where_above(across, 0.0, saved, 0.0))
 
 
 @inner_kernel
 def costed(ground, lift, length, c):
     """The cost of a piece of a length, by the smooth cost."""
-    return max(length * mean_cost(lift, c), smooth_floor(ground) * sqrt(lift.vv))
+    return larger(length * mean_cost(lift, c), smooth_floor(ground) * sqrt(lift.vv))
 
 
 @inner_kernel
@@ -140,11 +193,20 @@ def smooth_floor(ground):
 
 
 @inner_kernel
-def times_cells(ground, cost, x0, y0, x2, y2):
-    """The cost of a piece between two places, in samples, times that of the cells it meets."""
+def times_cells_of_one(ground, cost, x0, y0, x2, y2):
     if not any_cells(ground.cells):
         return cost
     return cost * mean_in_cells(ground.cells, x0, y0, x2, y2)
+
+
+@inner_kernel
+def times_no_cells(ground, cost, x0, y0, x2, y2):
+    return cost
+
+
+@per_class({Ground: times_cells_of_one, FourGrounds: times_no_cells})
+def times_cells(ground, cost, x0, y0, x2, y2):
+    """The cost of a piece between two places, in samples, times that of the cells it meets."""
 
 
 # Pieces between samples
@@ -163,20 +225,27 @@ def sampled_piece(ground, i, j, ex, ey):
     il, ir = clamp(i1 + ey, columns), clamp(i1 - ey, columns)
     jl, jr = clamp(j1 - ex, rows), clamp(j1 + ex, rows)
     lift = flat(
+        zero(ground),
         2.0 * ex * ground.dx,
         2.0 * ey * ground.dy,
         0.5 * (ir - il) * ground.dx,
         0.5 * (jr - jl) * ground.dy,
     )
     for layer in range(ground.heights.shape[0]):
-        z = ground.heights[layer]
-        w = 0.5 * (z[jr, ir] - z[jl, il])
-        lift = plus_rise(lift, z[j, i], z[j1, i1], z[j2, i2], w)
+        z = ground.heights
+        z0, z1 = sample(ground, z, layer, j, i), sample(ground, z, layer, j1, i1)
+        w = 0.5 * (sample(ground, z, layer, jr, ir) - sample(ground, z, layer, jl, il))
+        lift = plus_rise(lift, z0, z1, sample(ground, z, layer, j2, i2), w)
     length = bent(lift)
     if ground.costs.shape[0] == 0:
         return times_cells(ground, length, i, j, i2, j2)
-    c = ground.costs[0]
-    costs = Costs(c[j, i], c[j1, i1], c[j2, i2], 0.5 * (c[jr, ir] - c[jl, il]))
+    c = ground.costs
+    costs = Costs(
+        sample(ground, c, 0, j, i),
+        sample(ground, c, 0, j1, i1),
+        sample(ground, c, 0, j2, i2),
+        0.5 * (sample(ground, c, 0, jr, ir) - sample(ground, c, 0, jl, il)),
+    )
     return times_cells(ground, costed(ground, lift, length, costs), i, j, i2, j2)
 
 
@@ -216,39 +285,43 @@ def place_at(ground, x, y):
 
 
 @inner_kernel
-def row_at(values, layer, j, p):
-    i = p.i
-    return (
-        p.x0 * values[layer, j, i - 1] + p.x1 * values[layer, j, i] + p.x2 * values[layer, j, i + 1]
-    )
+def row_at(ground, values, layer, j, p):
+    middle = sample(ground, values, layer, j, p.i)
+    if p.a == 0.0:
+        return middle
+    left = sample(ground, values, layer, j, p.i - 1)
+    return p.x0 * left + p.x1 * middle + p.x2 * sample(ground, values, layer, j, p.i + 1)
 
 
 @inner_kernel
-def read(values, layer, p):
+def read(ground, values, layer, p):
     """A layer at a place."""
-    return (
-        p.y0 * row_at(values, layer, p.j - 1, p)
-        + p.y1 * row_at(values, layer, p.j, p)
-        + p.y2 * row_at(values, layer, p.j + 1, p)
+    middle = row_at(ground, values, layer, p.j, p)
+    if p.b == 0.0:
+        return middle
+    below, above = (
+        row_at(ground, values, layer, p.j - 1, p),
+        row_at(ground, values, layer, p.j + 1, p),
     )
+    return p.y0 * below + p.y1 * middle + p.y2 * above
 
 
 @inner_kernel
-def slope_along(values, layer, p, wx, wy):
+def slope_along(ground, values, layer, p, wx, wy):
     """The slope of a layer at a place along w, per sample."""
     rows = (
-        row_at(values, layer, p.j - 1, p),
-        row_at(values, layer, p.j, p),
-        row_at(values, layer, p.j + 1, p),
+        row_at(ground, values, layer, p.j - 1, p),
+        row_at(ground, values, layer, p.j, p),
+        row_at(ground, values, layer, p.j + 1, p),
     )
     rise = (p.b - 0.5) * rows[0] - 2.0 * p.b * rows[1] + (p.b + 0.5) * rows[2]
-    run = 0.0
+    run = zero(ground)
     for k in range(3):
-        y = p.y0 if k == 0 else p.y1 if k == 1 else p.y2
-        run += y * (
-            (p.a - 0.5) * values[layer, p.j - 1 + k, p.i - 1]
-            - 2.0 * p.a * values[layer, p.j - 1 + k, p.i]
-            + (p.a + 0.5) * values[layer, p.j - 1 + k, p.i + 1]
+        j, y = p.j - 1 + k, p.y0 if k == 0 else p.y1 if k == 1 else p.y2
+        run = run + y * (
+            (p.a - 0.5) * sample(ground, values, layer, j, p.i - 1)
+            - 2.0 * p.a * sample(ground, values, layer, j, p.i)
+            + (p.a + 0.5) * sample(ground, values, layer, j, p.i + 1)
         )
     return wx * run + wy * rise
 
@@ -259,20 +332,21 @@ def piece(ground, x0, y0, x2, y2):
     dx, dy = x2 - x0, y2 - y0
     p0, p2 = place_at(ground, x0, y0), place_at(ground, x2, y2)
     p1 = place_at(ground, 0.5 * (x0 + x2), 0.5 * (y0 + y2))
-    lift = flat(dx * ground.dx, dy * ground.dy, -dy * ground.dx, dx * ground.dy)
-    z = ground.heights
+    lift = flat(zero(ground), dx * ground.dx, dy * ground.dy, -dy * ground.dx, dx * ground.dy)
+    z, c = ground.heights, ground.costs
     for layer in range(z.shape[0]):
-        across = slope_along(z, layer, p1, -dy, dx)
-        lift = plus_rise(lift, read(z, layer, p0), read(z, layer, p1), read(z, layer, p2), across)
+        across = slope_along(ground, z, layer, p1, -dy, dx)
+        z0, z1 = read(ground, z, layer, p0), read(ground, z, layer, p1)
+        lift = plus_rise(lift, z0, z1, read(ground, z, layer, p2), across)
     length = bent(lift)
-    if ground.costs.shape[0] == 0:
+    if c.shape[0] == 0:
         return times_cells(ground, length, x0, y0, x2, y2)
     floor = smooth_floor(ground)
     costs = Costs(
-        max(read(ground.costs, 0, p0), floor),
-        max(read(ground.costs, 0, p1), floor),
-        max(read(ground.costs, 0, p2), floor),
-        slope_along(ground.costs, 0, p1, -dy, dx),
+        larger(read(ground, c, 0, p0), floor),
+        larger(read(ground, c, 0, p1), floor),
+        larger(read(ground, c, 0, p2), floor),
+        slope_along(ground, c, 0, p1, -dy, dx),
     )
     return times_cells(ground, costed(ground, lift, length, costs), x0, y0, x2, y2)
 
@@ -286,7 +360,7 @@ def inside(ground, x, y):
     )
 
 
-@kernel
+@inner_kernel
 def gain_by_bending(ground, x0, y0, x2, y2):
     """What a path between two places saves, beside its halves, by bending as a whole."""
     dx, dy = x2 - x0, y2 - y0
@@ -296,18 +370,19 @@ def gain_by_bending(ground, x0, y0, x2, y2):
     p0, p1, p2 = place_at(ground, x0, y0), place_at(ground, x1, y1), place_at(ground, x2, y2)
     left, right = place_at(ground, lx, ly), place_at(ground, rx, ry)
     wx, wy = 0.5 * (rx - lx), 0.5 * (ry - ly)
-    lift = flat(dx * ground.dx, dy * ground.dy, wx * ground.dx, wy * ground.dy)
+    lift = flat(zero(ground), dx * ground.dx, dy * ground.dy, wx * ground.dx, wy * ground.dy)
     for layer in range(ground.heights.shape[0]):
         z = ground.heights
-        w = 0.5 * (read(z, layer, right) - read(z, layer, left))
-        lift = plus_rise(lift, read(z, layer, p0), read(z, layer, p1), read(z, layer, p2), w)
+        w = 0.5 * (read(ground, z, layer, right) - read(ground, z, layer, left))
+        z0, z1 = read(ground, z, layer, p0), read(ground, z, layer, p1)
+        lift = plus_rise(lift, z0, z1, read(ground, z, layer, p2), w)
     both = lift.dw - lift.dv * lift.vw / lift.vv
     across = lift.ww - lift.vw * lift.vw / lift.vv
     sag = lift.dd - lift.dv * lift.dv / lift.vv
-    if not (across > 0.0 and sag > 0.0):
-        return 0.0
-    halves = sqrt(lift.first) + sqrt(lift.second) - sqrt(lift.vv)
-    return ground.floor * max(halves, 0.0) * min(both * both / (across * sag), 1.0)
+    halves = larger(sqrt(lift.first) + sqrt(lift.second) - sqrt(lift.vv), 0.0)
+    share = both * both / (across * sag)
+    gain = ground.floor * halves * where_above(1.0, share, share, 1.0)
+    return where_above(across, 0.0, where_above(sag, 0.0, gain, 0.0), 0.0)
 
 
 @inner_kernel
@@ -316,15 +391,16 @@ def ray(ground, x, y, dx, dy):
     count = 1
     while ground.reach * count < max(abs(dx), abs(dy)) - 1e-9:
         count *= 2
-    cost = 0.0
+    cost = zero(ground)
     for k in range(count):
         a, b = k / count, (k + 1) / count
-        cost += piece(ground, x + a * dx, y + a * dy, x + b * dx, y + b * dy)
+        cost = cost + piece(ground, x + a * dx, y + a * dy, x + b * dx, y + b * dy)
     while count > 1:
         count //= 2
         for k in range(count):
             a, b = k / count, (k + 1) / count
-            cost -= gain_by_bending(ground, x + a * dx, y + a * dy, x + b * dx, y + b * dy)
+            gain = gain_by_bending(ground, x + a * dx, y + a * dy, x + b * dx, y + b * dy)
+            cost = cost - gain
     return cost
 
 
@@ -334,44 +410,3 @@ def fill_rays(ground, x, y, places, costs):
     for m in range(places.shape[0]):
         dx, dy = places[m, 0] - x, places[m, 1] - y
         costs[m] = ray(ground, x, y, dx, dy) if dx != 0.0 or dy != 0.0 else 0.0
-
-
-# Pieces of the surface itself
-
-
-@kernel
-def surface_piece(surface, ax, ay, bx, by):
-    """The cost of a piece between two places, map units."""
-    vx, vy = bx - ax, by - ay
-    a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)
-    middle = spot_at(surface, ax + 0.5 * vx, ay + 0.5 * vy)
-    lift = flat(vx, vy, -vy, vx)
-    for layer in range(surface.weights.shape[0]):
-        weight, slope = surface.weights[layer], slope_at(surface, layer, middle)
-        z0, z2 = slope_at(surface, layer, a).f, slope_at(surface, layer, b).f
-        across = weight * (vx * slope.fy - vy * slope.fx)
-        lift = plus_rise(lift, weight * z0, weight * slope.f, weight * z2, across)
-    if not lift.vv > 0.0:
-        return 0.0
-    rise = log_cost_at(surface, ax + 0.5 * vx, ay + 0.5 * vy)
-    c = sqrt(squared_cost_at(surface, middle))
-    costs = Costs(
-        sqrt(squared_cost_at(surface, a)),
-        c,
-        sqrt(squared_cost_at(surface, b)),
-        c * (vx * rise.fy - vy * rise.fx),
-    )
-    cost = bent(lift) * mean_cost(lift, costs)
-    if not has_cells(surface):
-        return max(cost, floor_of(surface) * sqrt(lift.vv))
-    return max(cost * mean_cell_cost(surface, ax, ay, bx, by), floor_of(surface) * sqrt(lift.vv))
-
-
-@kernel
-def surface_ray(surface, ax, ay, bx, by, count):
-    """The cost of the straight line between two places, map units, in so many pieces."""
-    cost, vx, vy = 0.0, (bx - ax) / count, (by - ay) / count
-    for k in range(count):
-        x, y = ax + k * vx, ay + k * vy
-        cost += surface_piece(surface, x, y, x + vx, y + vy)
-    return cost

@@ -11,10 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..bits import count_bits, lowest_bit, steps_after, steps_before
 from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
 from ..surface.surfaces import Metric
-from .ground import ray, sampled_piece
+from ..vec4 import any_above, larger
+from .ground import sample, seen_from, zero
 
 
 def _directions(levels):
@@ -36,6 +38,7 @@ def _directions(levels):
 DIRECTIONS = _directions(4)
 HALF, QUARTER, EIGHTH = 32, 16, 8
 EAST, NORTH = DIRECTIONS[:, 0].copy(), DIRECTIONS[:, 1].copy()
+X, Y = EAST.astype(np.float64), NORTH.astype(np.float64)
 FARTHEST = 5
 BASE = sum(1 << k for k in range(0, HALF, EIGHTH))
 
@@ -55,11 +58,18 @@ ACUTE = 0.65
 
 
 class Stars(NamedTuple):
-    """The edges of node n are those from first[n] to first[n + 1], by their angle."""
+    """The edges between nodes. Bit k of ahead[n] is set where one leads from node n along
+    direction k; then bit k of back[m] is set, m being the node that it leads to.
 
-    first: np.ndarray  # (n + 1,) int32
-    directions: np.ndarray  # (edges,) uint8: which of DIRECTIONS
-    costs: np.ndarray  # (edges,) float32
+    The directions of BASE have their costs in ``base``, the others of a node in ``others``, from
+    first[n] on and by their direction.
+    """
+
+    ahead: np.ndarray  # (n,) uint32
+    back: np.ndarray  # (n,) uint32
+    base: np.ndarray  # (n, 4) float32
+    first: np.ndarray  # (n,) int32
+    others: np.ndarray  # (edges,) float32
 
 
 # Which edges
@@ -68,18 +78,14 @@ class Stars(NamedTuple):
 @inner_kernel
 def product(h, a, b):
     """The product of two directions under the metric of a node, in nodes."""
-    return (
-        h.h11 * EAST[a] * EAST[b]
-        + h.h12 * (EAST[a] * NORTH[b] + NORTH[a] * EAST[b])
-        + h.h22 * NORTH[a] * NORTH[b]
-    )
+    return h.h11 * (X[a] * X[b]) + h.h12 * (X[a] * Y[b] + Y[a] * X[b]) + h.h22 * (Y[a] * Y[b])
 
 
 @inner_kernel
 def is_wide(h, a, b):
-    """Is the angle between two directions too wide?"""
-    both = product(h, a, b)
-    return not both > 0.0 or both * both < ACUTE * ACUTE * product(h, a, a) * product(h, b, b)
+    """Is the angle between two directions too wide, for any of the metrics?"""
+    both = larger(product(h, a, b), 0.0)
+    return any_above(ACUTE * ACUTE * product(h, a, a) * product(h, b, b), both * both)
 
 
 @inner_kernel
@@ -89,12 +95,12 @@ def metric_of_node(ground, i, j):
     rows, columns = ground.heights.shape[1], ground.heights.shape[2]
     i0, i1 = max(per * i - 1, 0), min(per * i + 1, columns - 1)
     j0, j1 = max(per * j - 1, 0), min(per * j + 1, rows - 1)
-    dx, dy = per * ground.dx, per * ground.dy
-    h11, h12, h22 = dx * dx, 0.0, dy * dy
-    for layer in range(ground.heights.shape[0]):
-        z = ground.heights[layer]
-        fx = (z[per * j, i1] - z[per * j, i0]) * (per / (i1 - i0))
-        fy = (z[j1, per * i] - z[j0, per * i]) * (per / (j1 - j0))
+    dx, dy, z = per * ground.dx, per * ground.dy, ground.heights
+    h11, h12, h22 = dx * dx + zero(ground), zero(ground), dy * dy + zero(ground)
+    for layer in range(z.shape[0]):
+        fx = sample(ground, z, layer, per * j, i1) - sample(ground, z, layer, per * j, i0)
+        fy = sample(ground, z, layer, j1, per * i) - sample(ground, z, layer, j0, per * i)
+        fx, fy = fx * (per / (i1 - i0)), fy * (per / (j1 - j0))
         h11, h12, h22 = h11 + fx * fx, h12 + fx * fy, h22 + fy * fy
     return Metric(h11, h12, h22)
 
@@ -118,13 +124,14 @@ def directions_between(h, a, width):
 
 
 @inner_kernel
-def needed(h):
-    """The bits of the directions in the first half of a node's star."""
-    bits = BASE
-    for a in range(0, HALF, EIGHTH):
-        if is_wide(h, a, (a + EIGHTH) % (2 * HALF)):
-            bits |= directions_between(h, a, EIGHTH)
-    return bits
+def has_wide_angles(h):
+    """Are any of the angles between the eight neighbours too wide?"""
+    return (
+        is_wide(h, 0, EIGHTH)
+        or is_wide(h, EIGHTH, 2 * EIGHTH)
+        or is_wide(h, 2 * EIGHTH, 3 * EIGHTH)
+        or is_wide(h, 3 * EIGHTH, 4 * EIGHTH)
+    )
 
 
 @inner_kernel
@@ -132,25 +139,60 @@ def is_inside(i, j, nx, ny):
     return 0 <= i < nx and 0 <= j < ny
 
 
+@inner_kernel
+def add_edges(nx, ny, i, j, bits, ahead, back):
+    """Add the edges from node (i, j) along directions, and against them."""
+    n = j * nx + i
+    while bits != 0:
+        k = lowest_bit(bits)
+        bits &= bits - 1
+        step = NORTH[k] * nx + EAST[k]
+        if is_inside(i + EAST[k], j + NORTH[k], nx, ny):
+            ahead[n] |= 1 << k
+            back[n + step] |= 1 << k
+        if is_inside(i - EAST[k], j - NORTH[k], nx, ny):
+            ahead[n - step] |= 1 << k
+            back[n] |= 1 << k
+
+
+@kernel
+def add_others(ground, nx, ny, i, j, ahead, back):
+    """Add the edges of node (i, j) that have other directions than those of BASE."""
+    h, bits = metric_of_node(ground, i, j), 0
+    for a in range(0, HALF, EIGHTH):
+        bits |= directions_between(h, a, EIGHTH)
+    add_edges(nx, ny, i, j, bits, ahead, back)
+
+
 @kernel
 def choose_edges(ground, nx, ny, rows, ahead, back):
-    """Choose the edges: bit k of ahead[n] leads from n along direction k, of back[n] against it.
+    """Choose the edges that the stars of some rows need; see Stars for ahead and back.
 
-    rows : the first, and the one after the last, of those whose stars are looked at.
+    rows : the first, and the one after the last.
     """
+    per = 2 * ground.pieces
+    fours = seen_from(ground, per, 2 * per, 3 * per)
     for j in range(rows[0], rows[1]):
-        for i in range(nx):
-            n, bits = j * nx + i, needed(metric_of_node(ground, i, j))
-            for k in range(0, HALF, EIGHTH if bits == BASE else 1):
-                if not bits >> k & 1:
-                    continue
-                step = NORTH[k] * nx + EAST[k]
-                if is_inside(i + EAST[k], j + NORTH[k], nx, ny):
-                    ahead[n] |= 1 << k
-                    back[n + step] |= 1 << k
-                if is_inside(i - EAST[k], j - NORTH[k], nx, ny):
-                    ahead[n - step] |= 1 << k
-                    back[n] |= 1 << k
+        for i in range(0, nx, 4):
+            inside = i > 0 and i + 4 < nx and 0 < j < ny - 1
+            if inside and not has_wide_angles(metric_of_node(fours, i, j)):
+                continue
+            for k in range(i, min(i + 4, nx)):
+                add_others(ground, nx, ny, k, j, ahead, back)
+
+
+def base_edges(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
+    """The edges to the eight neighbours: ahead and back of Stars, both (n,)."""
+    ahead, back = np.full((ny, nx), BASE, np.uint32), np.full((ny, nx), BASE, np.uint32)
+    for k in range(0, HALF, EIGHTH):
+        east, bit = EAST[k], np.uint32(1 << k)
+        if NORTH[k]:
+            ahead[-1] &= ~bit
+            back[0] &= ~bit
+        if east:
+            ahead[:, -1 if east > 0 else 0] &= ~bit
+            back[:, 0 if east > 0 else -1] &= ~bit
+    return ahead.ravel(), back.ravel()
 
 
 @kernel
@@ -158,91 +200,72 @@ def cut_edges(space, grid, rows, ahead, back):
     """Remove the edges from some rows that touch an obstacle."""
     for n in range(rows[0] * grid.nx, rows[1] * grid.nx):
         x, y = grid.x0 + n % grid.nx * grid.dx, grid.y0 + n // grid.nx * grid.dy
-        for k in range(HALF):
-            if not ahead[n] >> k & 1:
-                continue
+        bits = np.int64(ahead[n])
+        while bits != 0:
+            k = lowest_bit(bits)
+            bits &= bits - 1
             ex, ey = EAST[k], NORTH[k]
             if not segment_is_free(space, x, y, x + ex * grid.dx, y + ey * grid.dy):
                 ahead[n] ^= 1 << k
                 back[n + ey * grid.nx + ex] ^= 1 << k
 
 
-# What edges cost
-
-
-@inner_kernel
-def count_bits(bits):
-    """How many of the 32 low bits are set."""
-    bits = bits - (bits >> 1 & 0x55555555)
-    bits = (bits & 0x33333333) + (bits >> 2 & 0x33333333)
-    bits = bits + (bits >> 4) & 0x0F0F0F0F
-    return bits * 0x01010101 >> 24 & 0xFF
-
-
 @kernel
-def count_edges(ahead, back, first):
-    """first[n + 1] : how many edges the nodes up to n have."""
+def count_others(ahead, first):
+    """first[n] : how many edges that are not of BASE lead ahead from the nodes before; returns
+    how many there are in all.
+    """
+    edges = 0
     for n in range(ahead.shape[0]):
-        edges = count_bits(np.int64(ahead[n])) + count_bits(np.int64(back[n]))
-        first[n + 1] = first[n] + edges
+        first[n] = edges
+        edges += count_bits(np.int64(ahead[n]) & ~BASE)
+    return edges
 
 
-@inner_kernel
-def edge_cost(ground, i, j, k):
-    """The cost of the edge along direction k from node (i, j), rounded up to 32 bits."""
-    per = 2 * ground.pieces
-    ex, ey = EAST[k], NORTH[k]
-    if 2 * ground.pieces * max(abs(ex), abs(ey)) <= ground.reach:
-        cost = sampled_piece(ground, per * i, per * j, ground.pieces * ex, ground.pieces * ey)
-    elif k % EIGHTH:
-        cost = ray(ground, float(per * i), float(per * j), float(per * ex), float(per * ey))
-    else:
-        cost = 0.0
-        for m in range(ground.pieces):
-            cost += sampled_piece(ground, per * i + 2 * m * ex, per * j + 2 * m * ey, ex, ey)
-    return np.float32(cost * (1.0 + 2.0**-23))
-
-
-@kernel
-def lay_edges(ground, nx, rows, ahead, back, stars):
-    """Write the edges from some rows, with their costs."""
-    for n in range(rows[0] * nx, rows[1] * nx):
-        bits, place = np.int64(ahead[n]), np.int64(stars.first[n])
-        for k in range(0, HALF, EIGHTH if bits & ~BASE == 0 else 1):
-            if not bits >> k & 1:
-                continue
-            cost = edge_cost(ground, n % nx, n // nx, k)
-            stars.directions[place], stars.costs[place] = k, cost
-            place += 1
-            m = n + NORTH[k] * nx + EAST[k]
-            before = count_bits(np.int64(back[m]) & (1 << k) - 1)
-            other = stars.first[m] + count_bits(np.int64(ahead[m])) + before
-            stars.directions[other], stars.costs[other] = k + HALF, cost
+def list_edges(stars: Stars) -> tuple[np.ndarray, ...]:
+    """The edges ahead: from which node, along which direction, and what they cost, (edges,)."""
+    lists = []
+    for k in range(HALF):
+        tails = np.flatnonzero(stars.ahead >> k & 1)
+        if k % EIGHTH == 0:
+            costs = stars.base[tails, k // EIGHTH]
+        else:
+            before = np.bitwise_count(stars.ahead[tails] & np.uint32(~BASE & (1 << k) - 1))
+            costs = stars.others[stars.first[tails] + before]
+        lists.append((tails, np.full(len(tails), k), costs))
+    return tuple(np.concatenate(columns) for columns in zip(*lists, strict=True))
 
 
 # Reading stars
 
 
 @inner_kernel
-def entry_of(stars, n, direction):
-    """Where node n's edge along a direction is listed, -1 where there is none."""
-    for e in range(stars.first[n], stars.first[n + 1]):
-        if stars.directions[e] == direction:
-            return e
-    return -1
+def bits_of(stars, n):
+    """The directions of all edges of a node, both ways."""
+    return np.int64(stars.ahead[n]) | np.int64(stars.back[n]) << HALF
 
 
 @inner_kernel
-def beside(stars, n, e, side):
-    """The next edge of node n by angle, on one side (1 or -1); -1 where none is near enough."""
-    first, last = np.int64(stars.first[n]), np.int64(stars.first[n + 1]) - 1
-    other = e + side
-    if other > last:
-        other = first
-    elif other < first:
-        other = last
-    turn = side * (np.int64(stars.directions[other]) - np.int64(stars.directions[e]))
-    return other if 0 < turn % (2 * HALF) <= QUARTER else -1
+def place_of_other(stars, n, k):
+    """Where the cost of an edge ahead is listed that has another direction than those of BASE."""
+    return stars.first[n] + count_bits(np.int64(stars.ahead[n]) & ~BASE & (1 << k) - 1)
+
+
+@inner_kernel
+def cost_along(stars, steps, n, k):
+    """The cost of an edge along any direction. steps : directions as differences of numbers."""
+    if k >= HALF:
+        n, k = n + steps[k], k - HALF
+    if k % EIGHTH == 0:
+        return np.float64(stars.base[n, k // EIGHTH])
+    return np.float64(stars.others[place_of_other(stars, n, k)])
+
+
+@inner_kernel
+def beside(bits, k, side):
+    """The next direction by angle, on one side (1 or -1) of k; -1 where none is near enough."""
+    steps = steps_after(bits, k) if side > 0 else steps_before(bits, k)
+    return (k + side * steps) % (2 * HALF) if steps <= QUARTER else -1
 
 
 @inner_kernel
