@@ -16,7 +16,7 @@ from ..surface.ground import quantity, value_unit
 from ..travel import TravelModel
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
-from .labels import format_length, in_words, lengths_in_words, straight_name
+from .labels import format_length, in_words, lengths_in_words, nothing_in_words, straight_name
 from .map_view import draw_map
 from .perspective import draw_perspective
 from .travel_view import draw_pace
@@ -34,7 +34,7 @@ def _title(solution: Solution) -> str:
     unit, length = solution.unit, solution.length
     name = f"{in_words(problem.name)}: " if problem.name else ""
     if length is None:
-        return f"{name}{solution.planner} found no path ({solution.samples:,} samples)"
+        return f"{name}{nothing_in_words(solution)} ({solution.samples:,} samples)"
     straight = solution.straight_length
     saved = 1.0 - length / straight if straight else 0.0
     against = (

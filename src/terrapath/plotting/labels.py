@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from ..io.routes.profile import clean
-from ..problem import Problem, Solution
+from ..problem import Problem, Solution, Status
 from ..surface.ground import is_weighted
 
 # Longer axes are in kilometres; metres.
@@ -35,6 +35,12 @@ def lengths_in_words(solution: Solution) -> str:
     if path.ground_length == path.length and not is_weighted(path.surface):
         return f"length {ground}"
     return f"{ground} on the ground, value {format_length(path.length, solution.unit)}"
+
+
+def nothing_in_words(solution: Solution) -> str:
+    """That there is no path, and whether that is proven."""
+    proven = " because none exists" if solution.status is Status.UNREACHABLE else ""
+    return f"{solution.planner} found no path{proven}"
 
 
 def straight_name(solution: Solution) -> str:

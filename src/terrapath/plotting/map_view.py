@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from .terrain import LAYER_COLOURS, Cells, Terrain, height_colours
 
 SAMPLES = 500
 CONTOURS = 14
+TITLE_WIDTH = 70  # letters
 LAYER_CONTOURS = 5
 # In samples. Without it, contours of a layer with rounded values would follow every step of it.
 LAYER_SMOOTHING = 8.0
@@ -196,8 +198,14 @@ def draw_ground(
 
 
 def draw_map(axes: Any, solution: Solution) -> None:
-    """Draw ground, tree and path on two-dimensional axes."""
+    """Draw ground, tree and path on two-dimensional axes, or what blocks where there is no path."""
     terrain = draw_ground(axes, solution.problem)
+    if solution.path is None:
+        from .blocked import Blockage, draw_blockage
+
+        blockage = Blockage(terrain)
+        draw_blockage(axes, blockage, _extent(solution.problem))
+        axes.set_title(fill(blockage.in_words, TITLE_WIDTH), fontsize=9)
     _draw_tree(axes, solution)
     _draw_path(axes, solution)
     axes.legend(loc="upper left", fontsize=8, framealpha=0.85)

@@ -19,7 +19,7 @@ from ..problem import Path as Route, Solution
 from ..space.free_space import sort_obstacles
 from ..surface.ground import height_scale
 from ..validation import Array
-from .labels import format_length, lengths_in_words
+from .labels import format_length, lengths_in_words, nothing_in_words
 from .map_view import ALTERNATIVE_COLOURS, PATH_COLOUR
 from .terrain import LAYER_COLOURS, Terrain, height_colours
 
@@ -158,6 +158,35 @@ def _blocked_traces(stage: Stage, place: dict[str, Any]) -> list[Any]:
     return [blocked, *keys]
 
 
+def _reached_traces(stage: Stage) -> list[Any]:
+    """Where there is no path, what can be reached from the start and from the goal."""
+    if stage.solution.path is not None:
+        return []
+    import plotly.graph_objects as go
+
+    from .blocked import Blockage
+
+    terrain = stage.terrain
+    traces: list[Any] = []
+    for cells, colour, label in Blockage(terrain).reached:
+        over = np.where(cells, terrain.values[0] + 0.5 * stage.lift, np.nan)
+        traces.append(
+            go.Surface(
+                x=terrain.x - stage.origin[0],
+                y=terrain.y - stage.origin[1],
+                z=over.astype(np.float32),
+                surfacecolor=np.zeros(over.shape, np.uint8),
+                colorscale=[(0.0, colour), (1.0, colour)],
+                showscale=False,
+                showlegend=True,
+                opacity=0.8,
+                hoverinfo="skip",
+                name=label,
+            )
+        )
+    return traces
+
+
 def _outlines(stage: Stage) -> list[Any]:
     """Edges of polygons, walls and discs as given, drawn on the terrain as one line with gaps."""
     import plotly.graph_objects as go
@@ -265,7 +294,7 @@ def _title(solution: Solution) -> str:
     unit, length = solution.unit, solution.length
     name = f"{solution.problem.name}: " if solution.problem.name else ""
     if length is None:
-        return f"{name}{solution.planner} found no path"
+        return f"{name}{nothing_in_words(solution)}"
     text = f"{name}{solution.planner}, {lengths_in_words(solution)}"
     if solution.lower_bound is None or solution.gap is None:
         return text
@@ -344,6 +373,7 @@ def draw_page(solution: Solution) -> Any:
 
     stage = Stage.of(solution)
     traces = [*_terrain_traces(stage), *_outlines(stage), *_route_traces(stage), *_marks(stage)]
+    traces += _reached_traces(stage)
     return go.Figure(traces, _layout(stage))
 
 

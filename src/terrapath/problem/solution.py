@@ -157,6 +157,11 @@ class Solution:
         return None if self.path is None else self.path.length
 
     @property
+    def is_interrupted(self) -> bool:
+        """Did the user stop the planner?"""
+        return self.status is Status.INTERRUPTED
+
+    @property
     def value(self) -> float | None:
         """What is minimised, measured on the path returned, in ``unit``, to 1e-9 relative."""
         return self.length

@@ -56,11 +56,16 @@ class Answer:
     def write(self) -> None:
         """Write the files that the scenario names, each completely or not at all.
 
-        Without a path nothing is written. Raises MapError, which names the file and the remedy.
+        Where no path was found, only the map and the page are drawn, with what blocks; after an
+        interrupt nothing is. Raises MapError, which names the file and the remedy.
         """
-        outputs = _outputs(self.scenario)
-        if outputs is not None and self.solution.path is not None:
-            outputs.write(self.solution)
+        outputs, solution = _outputs(self.scenario), self.solution
+        if outputs is None:
+            return
+        if solution.path is not None:
+            outputs.write(solution)
+        elif not solution.is_interrupted:
+            outputs.draw(solution)
 
 
 def _goal_record(answer: GoalAnswer) -> dict[str, object]:

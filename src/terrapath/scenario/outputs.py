@@ -140,14 +140,19 @@ class RouteOutputs:
                 tell(UnfinishedWarning(f"{path} was not written: no lower bound was proven"))
             else:
                 leg.certificate.save(path)
-        if section.plot is not None:
-            from ..plotting import plot_route
-
-            plot_route(solution, section.plot)
         if section.profile is not None:
             from ..plotting import plot_profile
 
             plot_profile(solution, section.profile)
+        self.draw(solution)
+
+    def draw(self, solution: Solution) -> None:
+        """Draw the map and the page, also of a solution without a path."""
+        section = self.section
+        if section.plot is not None:
+            from ..plotting import plot_route
+
+            plot_route(solution, section.plot)
         if section.page is not None:
             from ..plotting import plot_page
 
