@@ -16,7 +16,7 @@ from .map_view import PATH_COLOUR
 HEIGHT_COLOUR, GROUND_COLOUR, LIMIT_COLOUR = "#6b5b3e", "#9a9a9a", "#8a2be2"
 LAYER_COLOUR, SIDE_COLOUR = "#0b6e4f", "#0b3dff"
 # Heights of the panels, inches.
-HEIGHT_PANEL, SLOPE_PANEL, LAYER_PANEL, TITLE = 2.6, 1.8, 1.2, 0.9
+HEIGHT_PANEL, SLOPE_PANEL, LAYER_PANEL, TITLE = 2.6, 1.8, 1.2, 1.2
 WIDTH = 10.0
 
 
@@ -41,10 +41,10 @@ def _draw_slopes(axes: Any, distance: Array, slope: Slopes, limit: float | None)
     axes.axhline(0.0, color="black", lw=0.6)
     if limit is not None:
         style = {"color": LIMIT_COLOUR, "ls": "--", "lw": 1.2}
-        axes.axhline(limit, label=f"limit of the ground's slope, {limit:g} degrees", **style)
+        axes.axhline(limit, label=f"limit of the ground, {limit:g} degrees", **style)
         axes.axhline(-limit, **style)
     axes.set_ylabel("slope (degrees)")
-    axes.legend(fontsize=8, loc="upper right", ncols=3, framealpha=0.85)
+    axes.legend(fontsize=8, loc="upper right", ncols=4, framealpha=0.85)
     low, high = axes.get_ylim()
     # Leave space for the line of the limit below, and for the legend above.
     axes.set_ylim(low - 0.04 * (high - low), high + 0.25 * (high - low))

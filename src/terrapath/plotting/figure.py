@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from .._support.files import written_whole
 from ..distance.field import DistanceField
 from ..errors import MapError
 from ..problem import Solution
-from ..surface.ground import quantity, value_unit
+from ..surface.ground import is_weighted, quantity, value_unit
 from ..travel import TravelModel
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
@@ -26,32 +27,36 @@ DOTS_PER_INCH = 140
 QUICK = {"compress_level": 3}
 PANEL_WIDTH = 5.4  # inches
 FIELD_WIDTH = 7.0
+# Letters in a line of a title that fit into the width of a map and of a profile.
+MAP_LETTERS, PROFILE_LETTERS = 150, 100
 FORMATS = (".png", ".svg", ".pdf", ".jpg")
 
 
-def _title(solution: Solution) -> str:
-    problem = solution.problem
-    unit, length = solution.unit, solution.length
+def _title(solution: Solution, width: int) -> str:
+    """What was found, in lines of at most so many letters."""
+    return "\n".join(fill(line, width) for line in _lines(solution))
+
+
+def _lines(solution: Solution) -> Iterator[str]:
+    problem, length = solution.problem, solution.length
     name = f"{in_words(problem.name)}: " if problem.name else ""
+    samples = f"{solution.samples:,} samples"
     if length is None:
-        return f"{name}{nothing_in_words(solution)} ({solution.samples:,} samples)"
+        yield f"{name}{nothing_in_words(solution)} ({samples})"
+        return
     straight = solution.straight_length
     saved = 1.0 - length / straight if straight else 0.0
+    less, more = ("less", "more") if is_weighted(problem.surface) else ("shorter", "longer")
     against = (
-        f"{100.0 * abs(saved):.1f} % {'shorter' if saved >= 0.0 else 'longer'} than the "
+        f"{100.0 * abs(saved):.1f} % {less if saved >= 0.0 else more} than the "
         f"{straight_name(solution)}"
     )
     refined = "" if solution.unrefined is None else ", refined"
-    title = (
-        f"{name}{solution.planner}{refined}, {lengths_in_words(solution)} "
-        f"({against}), {solution.samples:,} samples"
-    )
+    yield f"{name}{solution.planner}{refined}, {lengths_in_words(solution)} ({against}), {samples}"
     if solution.lower_bound is None or solution.gap is None:
-        return title
-    bound = format_length(solution.lower_bound, unit)
-    return (
-        f"{title}\nproven: {solution.bound_in_words} than {bound}, a gap of {solution.gap_in_words}"
-    )
+        return
+    bound = format_length(solution.lower_bound, solution.unit)
+    yield f"proven: {solution.bound_in_words} than {bound}, a gap of {solution.gap_in_words}"
 
 
 def draw_route(solution: Solution) -> Any:
@@ -66,7 +71,7 @@ def draw_route(solution: Solution) -> Any:
     panels = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.05))
     draw_map(figure.add_subplot(panels[0]), solution)
     draw_perspective(figure.add_subplot(panels[1], projection="3d"), solution)
-    figure.suptitle(_title(solution), fontsize=12)
+    figure.suptitle(_title(solution, MAP_LETTERS), fontsize=12)
     return figure
 
 
@@ -93,7 +98,7 @@ def draw_profile(solution: Solution) -> Any:
         raise MapError("there is no profile to draw: no path was found")
     figure = Figure(figsize=chart_size(solution.path), layout="constrained")
     draw_charts(figure, solution, solution.path)
-    figure.suptitle(_title(solution), fontsize=12)
+    figure.suptitle(_title(solution, PROFILE_LETTERS), fontsize=12)
     return figure
 
 
