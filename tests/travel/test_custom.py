@@ -104,6 +104,27 @@ def test_kinks_of_a_function_are_found_where_nobody_names_them(kinks):
     assert len(model.pace.coefficients) < 10
 
 
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(numbers(-1.5, 1.5), min_size=3, max_size=3, unique=True),
+    st.lists(numbers(-1.5, 2.5), min_size=3, max_size=3),
+    numbers(-1.0, 1.0),
+)
+def test_kinks_and_jumps_of_a_function_are_found_wherever_they_are(places, bends, jump):
+    assume(np.diff(np.sort(places)).min() > 1e-3)
+    assume(np.abs(places).min() > 1e-3)
+
+    def pace(m):
+        bent = sum(bend * np.abs(m - place) for bend, place in zip(bends, places, strict=True))
+        return 12.0 + bent + np.where(m > places[0], jump, 0.0)
+
+    model = tp.travel.from_function(pace, beyond="switchbacks")
+    above = np.nextafter(places[0], 9.0)
+    rows = np.array([-2.0, 2.0, 0.0, *places, above])
+    for grade in (*GRADES[::8], *places):
+        assert model(grade) == pytest.approx(cheapest_mix(rows, pace(rows), grade), rel=1e-7)
+
+
 def test_a_jump_of_a_function_is_found():
     def pace(m):
         rates = np.select([m >= 0, m >= -0.2125], [6, 1.9998], -1.9998)

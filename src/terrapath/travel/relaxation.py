@@ -61,7 +61,8 @@ def relax(pieces: Pieces, unbounded: tuple[bool, bool]) -> Relaxed:
         )
     downhill = _end(-pieces, unbounded[0], level)
     uphill = _end(pieces, unbounded[1], level)
-    convex, bridges = _envelope(pieces.between(-downhill.grade, uphill.grade), level)
+    down, up = (end.intercept + end.slope * end.grade for end in (downhill, uphill))
+    convex, bridges = _envelope(pieces.between(-downhill.grade, uphill.grade), (down, up), level)
     return Relaxed(convex, downhill, uphill, bridges)
 
 
@@ -86,7 +87,7 @@ def _least_ratio(pieces: Pieces) -> float:
 def _end(pieces: Pieces, unbounded: bool, level: float) -> End:
     """The critical grade uphill: where a metre of climb costs least, the smallest such grade."""
     uphill = _uphill(pieces)
-    costs = [pair for piece in range(len(uphill.coefficients)) for pair in _climbs(uphill, piece)]
+    costs = [pair for piece in _promising(uphill) for pair in _climbs(uphill, piece)]
     cost, _ = min(costs)
     grade = min(m for each, m in costs if (each - cost) * m <= TOUCHING * level)
     last = float(uphill.knots[-1])
@@ -94,6 +95,14 @@ def _end(pieces: Pieces, unbounded: bool, level: float) -> End:
         value, slope = (float(uphill.at_ends(order)[1][-1]) for order in (0, 1))
         return End(last, math.inf, slope, max(value - slope * last, 0.0))
     return End(grade, grade, cost, 0.0)
+
+
+def _promising(uphill: Pieces) -> list[int]:
+    """The pieces where, by their samples, a metre of climb may cost least."""
+    grades, values = uphill.samples()
+    ratios = values[:, 1:] / grades[:, 1:]  # without level ground
+    least, most = ratios.min(axis=1), ratios.max(axis=1)
+    return [int(piece) for piece in np.flatnonzero(least - 0.01 * (most - least) <= least.min())]
 
 
 def _climbs(pieces: Pieces, piece: int) -> list[tuple[float, float]]:
@@ -114,17 +123,25 @@ def _climbs(pieces: Pieces, piece: int) -> list[tuple[float, float]]:
 # The lower envelope
 
 
-def _envelope(pieces: Pieces, level: float) -> tuple[Pieces, list[tuple[float, float]]]:
-    """The greatest convex function below, with a straight piece over each part that is not."""
+def _envelope(
+    pieces: Pieces, ends: tuple[float, float], level: float
+) -> tuple[Pieces, list[tuple[float, float]]]:
+    """The greatest convex function below, with a straight piece over each part that is not.
+
+    ends : the values at both ends, which may be below the pieces where the pace jumps there.
+    """
     grades, values = (part.ravel() for part in pieces.samples())
+    jumps = [values[k] - end > TOUCHING * level for k, end in zip((0, -1), ends, strict=True)]
+    values[0], values[-1] = min(values[0], ends[0]), min(values[-1], ends[1])
     hull = _lower_hull(grades, values)
     bridges = []
     for a, b in itertools.pairwise(hull):
         share = (grades[a + 1 : b] - grades[a]) / (grades[b] - grades[a])
         chord = values[a] + share * (values[b] - values[a])
         rounding = TOUCHING * (level + np.abs(values[a : b + 1]).max())
-        if (values[a + 1 : b] - chord > rounding).any():
-            bridges.append(_bridge(pieces, grades, (a, b)))
+        at_jump = (a == 0 and jumps[0]) or (b == len(values) - 1 and jumps[1])
+        if at_jump or (values[a + 1 : b] - chord > rounding).any():
+            bridges.append(_bridge(pieces, grades, values, (a, b)))
     return _bridged(pieces, bridges), [(left, right) for (left, right), _ in bridges]
 
 
@@ -151,29 +168,32 @@ def _lower_hull(grades: Array, values: Array) -> list[int]:
 Bridge = tuple[tuple[float, float], tuple[float, float]]  # its grades, and its values there
 
 
-def _bridge(pieces: Pieces, grades: Array, ends: tuple[int, int]) -> Bridge:
-    """The common tangent near two samples."""
-    from scipy.optimize import brentq
+def _bridge(pieces: Pieces, grades: Array, values: Array, ends: tuple[int, int]) -> Bridge:
+    """The common tangent near two samples.
 
-    left, right = (_around(pieces, grades, k) for k in ends)
-    a, b = grades[ends[0]], grades[ends[1]]
+    With a slope B both sides have a grade where f - B m is least. The slope of the chord between
+    those two points is the next B: Newton's step for the B at which both sides are equally low.
+    """
+    a, b = ends
+    # No sample is on both sides, as there is one between that lies above the chord.
+    left, right = _around(pieces, grades, a - 2, a + 1), _around(pieces, grades, b - 1, b + 2)
+    slope, step = (values[b] - values[a]) / (grades[b] - grades[a]), math.inf
+    while True:
+        low, start = min(left.lowest(slope), (values[a] - slope * grades[a], grades[a]))
+        high, end = min(right.lowest(slope), (values[b] - slope * grades[b], grades[b]))
+        at_ends = low + slope * start, high + slope * end
+        if start >= end:  # by rounding, at a kink
+            return (float(grades[a]), float(grades[b])), (float(values[a]), float(values[b]))
+        last, slope = slope, (at_ends[1] - at_ends[0]) / (end - start)
+        # Steps shrink until they are rounding.
+        if not abs(slope - last) < step:
+            return (float(start), float(end)), (float(at_ends[0]), float(at_ends[1]))
+        step = abs(slope - last)
 
-    def difference(slope: float) -> float:
-        return left.lowest(slope)[0] - right.lowest(slope)[0]
 
-    middle = (right.lowest(0.0)[0] - left.lowest(0.0)[0]) / (b - a)
-    width = 1e-3 * (abs(middle) + abs(left.lowest(0.0)[0]))
-    while difference(middle - width) > 0 or difference(middle + width) < 0:
-        width *= 2.0
-    slope = brentq(difference, middle - width, middle + width, xtol=1e-15 * width, rtol=1e-15)
-    (first, start), (second, end) = left.lowest(slope), right.lowest(slope)
-    return (float(start), float(end)), (first + slope * start, second + slope * end)
-
-
-def _around(pieces: Pieces, grades: Array, sample: int) -> Pieces:
-    """The part within the samples beside one."""
-    near = grades[max(sample - 2, 0) : sample + 3]
-    return pieces.between(float(near.min()), float(near.max()))
+def _around(pieces: Pieces, grades: Array, first: int, last: int) -> Pieces:
+    """The part between two samples, or as far as there are samples."""
+    return pieces.between(float(grades[max(first, 0)]), float(grades[min(last, len(grades) - 1)]))
 
 
 def _bridged(pieces: Pieces, bridges: list[Bridge]) -> Pieces:
