@@ -225,9 +225,10 @@ def _lay_stars(
             "all; give a wider spacing"
         )
     parts, (ahead, back) = _parts(lattice), star.base_edges(lattice.nx, lattice.ny)
+    wide = np.zeros(count, np.uint8)
 
     def choose(rows: tuple[int, int]) -> None:
-        star.choose_edges(samples, lattice.nx, lattice.ny, rows, ahead, back)
+        star.choose_edges(samples, lattice.nx, lattice.ny, rows, ahead, back, wide)
 
     def cut(rows: tuple[int, int]) -> None:
         star.cut_edges(free_space.data, lattice.data, rows, ahead, back)
@@ -240,7 +241,7 @@ def _lay_stars(
     first = np.empty(count, np.int32)
     others = np.empty(star.count_others(ahead, first), np.float32)
     base = np.full((count, 4), np.inf, np.float32)
-    stars = star.Stars(ahead, back, base, first, others)
+    stars = star.Stars(ahead, back, base, first, others, wide)
 
     def lay(rows: tuple[int, int]) -> None:
         waiting, counts = np.zeros((star.HALF, 3), edges.WAITING), np.zeros(star.HALF, np.int64)
@@ -259,9 +260,9 @@ def _parts(lattice: Lattice) -> list[tuple[int, int]]:
 
 
 def _no_stars(count: int) -> star.Stars:
-    none = np.zeros(count, np.uint32)
-    costs = np.full((count, 4), np.inf, np.float32)
-    return star.Stars(none, none, costs, np.zeros(count, np.int32), np.empty(0, np.float32))
+    none, first = np.zeros(count, np.uint32), np.zeros(count, np.int32)
+    base, others = np.full((count, 4), np.inf, np.float32), np.empty(0, np.float32)
+    return star.Stars(none, none, base, first, others, np.zeros(count, np.uint8))
 
 
 def lift_of(surface: Surface, point: PointLike) -> Array:

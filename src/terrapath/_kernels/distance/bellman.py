@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler import inner_kernel
+from ..compiler import inner_kernel, kernel
 from ..space.free_space import segment_is_free
 from .ground import (
     Costs,
@@ -26,7 +26,7 @@ from .ground import (
     times_cells,
 )
 from .segments import NO_SEGMENT, End, Segment, place_of_least, value_on
-from .star import EAST, NORTH, X, Y, beside, bits_of, cost_along, direction_of
+from .star import ACUTE, EAST, NORTH, X, Y, beside, bits_of, cost_along, direction_of
 
 
 class Source(NamedTuple):
@@ -292,6 +292,13 @@ def segment_beside(medium, front, state, source, node, end, side):
 
 
 @inner_kernel
+def is_too_wide(end, s):
+    """Is the angle between the edges to both ends of a segment too wide?"""
+    both = max(end.aa + s.ae, 0.0)
+    return both * both < ACUTE * ACUTE * end.aa * (end.aa + 2.0 * s.ae + s.ee)
+
+
+@inner_kernel
 def value_of(medium, front, state, source, node, k):
     """The value of a node by its edge along k, or by one of the segments beside that."""
     end = end_of(medium, front, state, source, node, k)
@@ -306,3 +313,24 @@ def value_of(medium, front, state, source, node, k):
         return best
     value = value_through(medium, front, state, source, node, k, segment.direction, segment.t)
     return min(best, value)
+
+
+@kernel
+def value_beside(medium, front, state, source, n, k):
+    """The value of node n by the segments beside its edge along k that are too wide.
+
+    They lie far from the node, as the lifted ground has it. So they count only where the ground
+    between is as even as the two edges say.
+    """
+    node, best = node_of(medium, source, n), math.inf
+    end = end_of(medium, front, state, source, node, k)
+    for side in (-1, 1):
+        segment = segment_beside(medium, front, state, source, node, end, side)
+        if segment.t > 0.0 and is_too_wide(end, segment):
+            t, kb = segment.t, segment.direction
+            value = value_through(medium, front, state, source, node, k, kb, t)
+            apart = abs(value - value_on(end, segment, t))
+            step = math.sqrt(max(end.aa + t * (2.0 * segment.ae + t * segment.ee), 0.0))
+            if apart <= MOST_CORRECTED * end.cost * step:
+                best = min(best, value)
+    return best

@@ -6,13 +6,15 @@ that nodes whose values differ by a share of the least edge may be settled in an
 is offered less later is queued again.
 """
 
+import math
+
 import numpy as np
 
 from ..bits import lowest_bit
 from ..compiler import inner_kernel, kernel
-from .bellman import chord_of, node_of, value_of
+from .bellman import chord_of, node_of, value_beside, value_of
 from .calendar_queue import QUEUED, dequeue, earliest, enqueue, list_of
-from .star import BASE, EIGHTH, HALF, place_of_other
+from .star import BASE, EIGHTH, HALF, bits_of, place_of_other
 
 SEED = 255
 
@@ -61,6 +63,20 @@ def offer_along(front, state, x, k, value):
     if value < front.trial[x]:
         state.best[x] = (k + HALF) % (2 * HALF)
         queue_up(front, state, x, value)
+
+
+@inner_kernel
+def look_again(medium, front, state, source, n):
+    """Offer what the wide segments that end in a settled node give to settled nodes around it."""
+    bits = bits_of(medium.stars, n)
+    while bits != 0:
+        k = lowest_bit(bits)
+        bits &= bits - 1
+        x = n + medium.steps[k]
+        if medium.stars.wide[x] and front.u[x] < math.inf:
+            opposite = (k + HALF) % (2 * HALF)
+            value = value_beside(medium, front, state, source, x, opposite)
+            offer_along(front, state, x, k, value)
 
 
 @inner_kernel
@@ -113,4 +129,6 @@ def march(medium, front, state, source, most, limit, in_order):
         state.queued[n] = 0
         settle(medium, front, state, source, n)
         offer(medium, front, state, n)
+        if medium.stars.wide[n]:
+            look_again(medium, front, state, source, n)
     return most

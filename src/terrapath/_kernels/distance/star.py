@@ -41,6 +41,7 @@ EAST, NORTH = DIRECTIONS[:, 0].copy(), DIRECTIONS[:, 1].copy()
 X, Y = EAST.astype(np.float64), NORTH.astype(np.float64)
 FARTHEST = 5
 BASE = sum(1 << k for k in range(0, HALF, EIGHTH))
+WIDE = 1 << HALF
 
 
 def _numbers():
@@ -70,6 +71,7 @@ class Stars(NamedTuple):
     base: np.ndarray  # (n, 4) float32
     first: np.ndarray  # (n,) int32
     others: np.ndarray  # (edges,) float32
+    wide: np.ndarray  # (n,) uint8: are angles left that are too wide?
 
 
 # Which edges
@@ -107,16 +109,20 @@ def metric_of_node(ground, i, j):
 
 @kernel
 def directions_between(h, a, width):
-    """The bits of the directions needed between a and a + width."""
+    """The bits of the directions needed between a and a + width; and WIDE, where these are not
+    enough.
+    """
     bits, k = 0, 0
     pieces = 1  # the k-th of so many equal parts is looked at
     while k < pieces:
         part = width // pieces
         begin = a + k * part
-        if part > 1 and is_wide(h, begin, (begin + part) % (2 * HALF)):
-            bits |= 1 << begin + part // 2
-            k, pieces = 2 * k, 2 * pieces
-            continue
+        if is_wide(h, begin, (begin + part) % (2 * HALF)):
+            if part > 1:
+                bits |= 1 << begin + part // 2
+                k, pieces = 2 * k, 2 * pieces
+                continue
+            bits |= WIDE
         k += 1
         while k % 2 == 0 and pieces > 1:
             k, pieces = k // 2, pieces // 2
@@ -156,16 +162,17 @@ def add_edges(nx, ny, i, j, bits, ahead, back):
 
 
 @kernel
-def add_others(ground, nx, ny, i, j, ahead, back):
+def add_others(ground, nx, ny, i, j, ahead, back, wide):
     """Add the edges of node (i, j) that have other directions than those of BASE."""
     h, bits = metric_of_node(ground, i, j), 0
     for a in range(0, HALF, EIGHTH):
         bits |= directions_between(h, a, EIGHTH)
-    add_edges(nx, ny, i, j, bits, ahead, back)
+    wide[j * nx + i] = bits & WIDE != 0
+    add_edges(nx, ny, i, j, bits & ~WIDE, ahead, back)
 
 
 @kernel
-def choose_edges(ground, nx, ny, rows, ahead, back):
+def choose_edges(ground, nx, ny, rows, ahead, back, wide):
     """Choose the edges that the stars of some rows need; see Stars for ahead and back.
 
     rows : the first, and the one after the last.
@@ -178,7 +185,7 @@ def choose_edges(ground, nx, ny, rows, ahead, back):
             if inside and not has_wide_angles(metric_of_node(fours, i, j)):
                 continue
             for k in range(i, min(i + 4, nx)):
-                add_others(ground, nx, ny, k, j, ahead, back)
+                add_others(ground, nx, ny, k, j, ahead, back, wide)
 
 
 def base_edges(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
