@@ -16,6 +16,10 @@ EXTRA_OF = {
     "plotly": "page",
     "gpxpy": "gpx",
     "rosbags": "ros",
+    "ruamel.yaml": "robots",
+    "laspy": "points",
+    "lazrs": "points",
+    "plyfile": "points",
 }
 
 

@@ -35,7 +35,8 @@ class Band(ABC):
 
     label : its name in messages. unit : "" where unknown. step : what its numbers are rounded to
     where they are stored as integers; 0 otherwise. unit_of_axes : of the coordinates, where
-    there is no CRS that names it. is_placed : does the map say where its cells lie? largest :
+    there is no CRS that names it. is_placed : does the map say where its cells lie? is_gridded :
+    were its cells chosen here, from points? largest :
     the largest number that its type of 8 or 16 bits without a sign can hold; 0 for others.
     """
 
@@ -45,6 +46,7 @@ class Band(ABC):
     step: float
     unit_of_axes: str = field(default="", kw_only=True)
     is_placed: bool = field(default=True, kw_only=True)
+    is_gridded: bool = field(default=False, kw_only=True)
     largest: int = field(default=0, kw_only=True)
 
     @abstractmethod

@@ -141,7 +141,7 @@ def open_band(
             label=str(path),
             unit=_unit(dataset, number),
             step=abs(dataset.scales[number - 1]) if kind.kind in "iu" else 0.0,
-            is_placed=not dataset.transform.is_identity,
+            is_placed=not (dataset.transform.is_identity or _is_unplaced(dataset)),
             largest=np.iinfo(kind).max if kind in (np.uint8, np.uint16) else 0,
             dataset=dataset,
             number=number,
@@ -247,7 +247,7 @@ def _unit(dataset: Any, number: int) -> str:
 def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
     """The grid of the cells; a file without a position has cells of side 1, north up."""
     own_crs = parse_crs(dataset.crs, f"the CRS of {path}")
-    transform = dataset.transform
+    transform = Affine.identity() if _is_unplaced(dataset) else dataset.transform
     if transform.is_identity:
         _require_no_other_position(path, dataset)
         transform = Affine(1.0, 0.0, 0.0, 0.0, -1.0, float(dataset.height))
@@ -258,6 +258,11 @@ def _grid(path: str | Path, dataset: Any, crs: CRS | None) -> Grid:
             "file"
         )
     return Grid(dataset.height, dataset.width, transform, with_crs(own_crs, crs, path))
+
+
+def _is_unplaced(dataset: Any) -> bool:
+    """Is it a picture of Netpbm alone? GDAL makes up where its cells lie."""
+    return dataset.driver == "PNM" and len(dataset.files) < 2
 
 
 def _require_no_other_position(path: str | Path, dataset: Any) -> None:

@@ -29,6 +29,11 @@ Source: TypeAlias = Union[
     str, Path, "DataArray", "Dataset", "tuple[ArrayLike, ArrayLike, ArrayLike]"
 ]
 
+# Files of robots and scanners, by their endings; see ``forms``.
+FORMS = {
+    ".yaml": "nav2", ".yml": "nav2", ".map": "movingai", ".las": "las", ".laz": "las",
+    ".ply": "ply", ".csv": "text", ".txt": "text", ".xyz": "text",
+}  # fmt: skip
 # How text begins that says where the data are, instead of holding them.
 DESCRIBES = re.compile(rb"<(VRT|OGRVRT|GDAL_W|WCS_GDAL|GDALTileIndex)")
 NETCDF_ENDINGS = (".nc", ".nc4", ".cdf", ".netcdf")
@@ -113,6 +118,11 @@ class LayerSource:
 
             if (named := netcdf(self.path)) is not None:
                 return _band_of_netcdf(self.path, *named, self.band, files, crs)
+        if (form := form_of(self.path, beginning)) is not None:
+            from .forms import is_grid_of_gdal, open_form
+
+            if not is_grid_of_gdal(Path(self.path), unsaid):
+                return open_form(form, Path(self.path), self.band, unsaid)
         return open_band(
             self.path,
             self.band,
@@ -129,6 +139,12 @@ def may_be_netcdf(path: str | Path, beginning: bytes) -> bool:
     return (
         beginning.startswith(b"CDF") or text.startswith("netcdf:") or text.endswith(NETCDF_ENDINGS)
     )
+
+
+def form_of(path: str | Path, beginning: bytes) -> str | None:
+    """The form of a file that GDAL does not read, as a key of ``forms.OPENERS``; or None."""
+    form = FORMS.get(Path(path).suffix.lower()) if beginning else None
+    return None if form == "movingai" and not beginning.startswith(b"type") else form
 
 
 def require_safe(name: str | Path, *, allow_external: bool) -> bytes:
@@ -306,6 +322,8 @@ def _as_range(given: tuple[float, float]) -> tuple[float, float]:
 
 
 def _with_cells(band: Band, size: float) -> Band:
+    if band.is_gridded:
+        return band
     if band.is_placed:
         raise InputError(
             f"cell_size={size:g}: {band.label} says itself where its cells lie; leave it out"

@@ -5,13 +5,15 @@ from __future__ import annotations
 import dataclasses
 import difflib
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     from ..problem import Problem, Solution
     from .base import Callback, Planner
     from .finished import Finished
@@ -31,18 +33,53 @@ _REGISTERED: dict[str, tuple[str, str, dict[str, Any]]] = {
 }
 
 
+# Where installed packages announce planners of their own: a name, and a class like ``Planner``.
+PLUG_INS = "terrapath.planners"
+
+
+@cache
+def _plug_ins() -> dict[str, EntryPoint]:
+    """The planners of other packages by their names; none takes the name of one of ours."""
+    from importlib.metadata import entry_points
+
+    return {e.name: e for e in entry_points(group=PLUG_INS) if e.name not in _REGISTERED}
+
+
+def _of_plug_in(entry: EntryPoint) -> type[Planner]:
+    """The class that an entry point names. Raises InputError where it cannot be used."""
+    try:
+        kind = entry.load()
+    except Exception as error:  # another package may raise anything while it is imported
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(
+            f"planner {entry.name!r} of {entry.value} cannot be loaded: {reason:.200}; repair or "
+            "uninstall its package"
+        ) from None
+    if not (isinstance(kind, type) and dataclasses.is_dataclass(kind) and hasattr(kind, "solve")):
+        raise InputError(
+            f"planner {entry.name!r} of {entry.value} is no planner: it must be a frozen dataclass "
+            "of options with solve(problem, *, callback=None), as terrapath.planners.base.Planner"
+        )
+    return cast("type[Planner]", kind)
+
+
 class _Planners(Mapping[str, Callable[..., "Planner"]]):
-    """What makes a planner from its options, by the planner's name."""
+    """What makes a planner from its options, by the planner's name; ours first."""
 
     def __getitem__(self, name: str) -> Callable[..., Planner]:
+        if name not in _REGISTERED:
+            return partial(_of_plug_in(_plug_ins()[name]))
         module, kind, fixed = _REGISTERED[name]
         return partial(getattr(import_module(f".{module}", __package__), kind), **fixed)
 
+    def __contains__(self, name: object) -> bool:
+        return name in _REGISTERED or name in _plug_ins()
+
     def __iter__(self) -> Iterator[str]:
-        return iter(_REGISTERED)
+        return iter([*_REGISTERED, *_plug_ins()])
 
     def __len__(self) -> int:
-        return len(_REGISTERED)
+        return len(_REGISTERED) + len(_plug_ins())
 
 
 PLANNERS: Mapping[str, Callable[..., Planner]] = _Planners()

@@ -286,6 +286,11 @@ def _at(where: str, given: Given) -> Scenario:
 
         is_allowed = bool(given.get("map", {}).get("allow_external"))
         return read_scenario(where, None if is_allowed else given)
+    if ".scen" in where.lower():
+        from .scen import is_scen, read_scen
+
+        if is_scen(where):
+            return read_scen(where)
     if not ending:  # names of scenes have none
         from ..problem.scenes import SCENES
 

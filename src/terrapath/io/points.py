@@ -1,0 +1,146 @@
+"""Scattered points, as from a laser scanner, on a grid: the mean height in each cell."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pyproj import CRS
+from rasterio import Affine
+
+from .._support.extras import require_packages
+from ..errors import MapError, MapWarning, tell
+from ..surface.georeference import parse_crs
+from ..surface.raster import Grid
+from ..validation import Array
+from .arrays import ArrayBand
+from .bands import Band
+from .rasters import reading, with_crs
+
+MOST_CELLS = 150_000_000
+FEWEST = 16  # points of a map
+POINTS_IN_CELL = 4.0  # on average, where no cell is given
+
+NAMES = (("x", "easting", "lon", "longitude"), ("y", "northing", "lat", "latitude"),
+         ("z", "height", "elevation", "altitude"))  # fmt: skip
+
+
+def open_points(
+    path: Path, number: int | str, crs: CRS | None, cell: float | None, read: str
+) -> Band:
+    """The points of a file as a band: the mean of the heights in each cell; voids have no data.
+
+    cell : the cells' side; None takes cells that hold four points on average. It is told, and so
+    are the voids. read : the name of the reader.
+    """
+    if number != 1:
+        raise MapError(f"band={number!r} is not in {path}; points have one band, their height")
+    with reading(path):
+        points, own = READERS[read](path)
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) < FEWEST:
+        raise MapError(f"{path} holds {len(points)} points; a map needs at least {FEWEST}")
+    low, span = points[:, :2].min(axis=0), np.ptp(points[:, :2], axis=0)
+    if not (span > 0.0).all():
+        raise MapError(f"{path}: all points lie on one line; a map needs points side by side")
+    step = _step(points)
+    side = cell or step or float(np.sqrt(POINTS_IN_CELL * span.prod() / len(points)))
+    if side == step:
+        low = low - 0.5 * side  # the points are the centres of cells
+    columns, rows = (np.floor(span / side).astype(int) + 1).tolist()
+    if rows * columns > MOST_CELLS:
+        raise MapError(
+            f"{path}: cells of {side:g} make {columns:,} x {rows:,} cells, more than "
+            f"{MOST_CELLS:,}; give larger ones by --cell-size"
+        )
+    place = ((points[:, :2] - low) / side).astype(np.intp)
+    index = place[:, 1] * columns + place[:, 0]
+    counts = np.bincount(index, minlength=rows * columns)
+    sums = np.bincount(index, points[:, 2], minlength=rows * columns)
+    means = np.full(rows * columns, np.nan)
+    np.divide(sums, counts, out=means, where=counts > 0)
+    voids = float((counts == 0).mean())
+    tell(
+        MapWarning(
+            f"{path}: {len(points):,} points are averaged on {columns:,} x {rows:,} cells of side "
+            f"{side:.6g}; {100.0 * voids:.3g} % of the cells are void, and blocked; change that by "
+            "--cell-size and --fill-holes"
+        )
+    )
+    grid = Grid(rows, columns, Affine(side, 0.0, low[0], 0.0, side, low[1]))
+    grid = Grid(rows, columns, grid.transform, with_crs(own, crs, path))
+    heights = means.reshape(rows, columns)
+    return ArrayBand(grid=grid, label=str(path), unit="", step=0.0, array=heights, is_gridded=True)
+
+
+def _step(points: Array) -> float | None:
+    """The step of points that lie on a grid, the same along x and y; None for others."""
+    steps = []
+    for axis in points[:, :2].T:
+        places = np.unique(axis)
+        gaps = np.diff(places)
+        if len(places) ** 2 > 64 * len(points) or np.ptp(gaps) > 1e-6 * gaps.min():
+            return None
+        steps.append(float(np.median(gaps)))
+    return steps[0] if abs(steps[0] - steps[1]) <= 1e-6 * steps[0] else None
+
+
+def _of_las(path: Path) -> tuple[Array, CRS | None]:
+    require_packages(
+        f"{path}, a point cloud,", "laspy", *(["lazrs"] if path.suffix.lower() == ".laz" else [])
+    )
+    import laspy
+
+    cloud = laspy.read(path)
+    return np.column_stack([cloud.x, cloud.y, cloud.z]), parse_crs(cloud.header.parse_crs())
+
+
+def _of_ply(path: Path) -> tuple[Array, CRS | None]:
+    require_packages(f"{path}, a point cloud,", "plyfile")
+    from plyfile import PlyData
+
+    vertices = PlyData.read(path)["vertex"]
+    return np.column_stack([np.asarray(vertices[axis], np.float64) for axis in "xyz"]), None
+
+
+def _of_text(path: Path) -> tuple[Array, CRS | None]:
+    """Rows of x, y and z, between commas, semicolons or blanks; a heading may name them."""
+    with path.open(encoding="utf-8-sig") as file:
+        first = file.readline()
+        separator = next((mark for mark in ",;\t" if mark in first), None)
+        names = next(csv.reader([first], delimiter=separator or " "))
+        columns, skipped = [0, 1, 2], 0
+        if not all(map(_is_number, (name for name in names if name.strip()))):
+            columns, skipped = _columns_of([name.strip().lower() for name in names], path), 1
+    rows = np.loadtxt(
+        path, delimiter=separator, skiprows=skipped, usecols=columns, ndmin=2, encoding="utf-8-sig"
+    )
+    return rows, None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _columns_of(names: list[str], path: Path) -> list[int]:
+    found = [next((names.index(name) for name in group if name in names), None) for group in NAMES]
+    if any(column is None for column in found):
+        raise MapError(
+            f"{path} has the columns {', '.join(names):.100}, of which not all of x, y and z are "
+            "known; name them so in its first line"
+        )
+    return [column for column in found if column is not None]
+
+
+READERS: dict[str, Callable[[Path], tuple[Any, CRS | None]]] = {
+    "las": _of_las,
+    "ply": _of_ply,
+    "text": _of_text,
+}
