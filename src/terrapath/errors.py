@@ -77,6 +77,10 @@ class GroundWarning(TerrapathWarning):
     """The planner may miss the shortest path on this kind of ground; another one does not."""
 
 
+class SnapWarning(TerrapathWarning):
+    """A start or a goal was not on free ground, and was moved there, as it was asked for."""
+
+
 class UnfinishedWarning(TerrapathWarning, RuntimeWarning):
     """A path could not be refined or bounded. It is left out, or returned as it was before."""
 

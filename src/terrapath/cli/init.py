@@ -8,14 +8,18 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
+from ..scenario.scenario import Given
 from .console import ExitCode
+from .options import with_options
 
 
+@with_options("constraints")
 def init_command(
     where: Annotated[
         str,
         typer.Argument(metavar="MAP", help="A raster, or a built-in scene."),
     ],
+    given: Given,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -30,6 +34,7 @@ def init_command(
 ) -> int:
     """Write a scenario file for a map: every key with its help, and a route that can be planned.
 
+    Constraints that are given stand in the file, and the route keeps to them.
     Exit codes: 0 written, 2 bad input.
     """
     from .._support.files import written_whole
@@ -42,7 +47,7 @@ def init_command(
     require_outputs([file], [where])
     if file.exists() and not force:
         raise InputError(f"{file} exists; name another by --output, or give --force to replace it")
-    text = template(where, file, crs=crs)
+    text = template(where, file, crs=crs, constraints=given.get("constraints"))
     with written_whole(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
     typer.echo(f"{file} is written; plan it by: terrapath plan {file}")

@@ -198,7 +198,14 @@ def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
     if problem.radius:
         yield "vehicle radius", _amount(problem.radius, unit) + ", kept from everything blocked"
     if problem.max_slope is not None:
-        yield "steepest ground", f"{problem.max_slope:g} degrees"
+        limit = problem.constraints.slope_limit
+        by = "by Horn's formula" if limit is not None and limit.by_horn else "at their steepest"
+        steep = problem.constraints.steep
+        share = 0.0 if steep is None else float(steep.blocked.mean())
+        yield (
+            "steepest ground",
+            f"{problem.max_slope:g} degrees; {percent(share)} of the cells are steeper, {by}",
+        )
     # In a corridor this area is the corridor, which is in the table already.
     if problem.keep_in is not None and solution.corridor is None:
         import shapely

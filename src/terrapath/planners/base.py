@@ -256,7 +256,15 @@ def answer_without_search(
     if not problem.is_unreachable:
         return None
     seconds = time.perf_counter() - started
-    return without_path(problem, planner, Status.UNREACHABLE, SEPARATED, seconds=seconds, seed=seed)
+    reason = separated(problem)
+    return without_path(problem, planner, Status.UNREACHABLE, reason, seconds=seconds, seed=seed)
+
+
+def separated(problem: Problem) -> str:
+    """Why an unreachable problem is so, with what lies between start and goal."""
+    return (
+        f"{SEPARATED}: {problem.constraints.separating(problem.start, problem.goal)} between them"
+    )
 
 
 def lattices(

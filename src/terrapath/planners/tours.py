@@ -17,11 +17,11 @@ from ..surface import metric
 from ..validation import Point, PointLike
 from .base import (
     INTERRUPT,
-    SEPARATED,
     Callback,
     Planner,
     Progress,
     limit_of,
+    separated,
     solve_within,
     without_path,
 )
@@ -169,7 +169,7 @@ class _Tour:
         legs = [whole.between_checked(a, b) for a, b in pairwise(points)]
         if len(legs) > 1 and any(leg.is_unreachable for leg in legs):
             k = next(k for k, leg in enumerate(legs, start=1) if leg.is_unreachable)
-            reason = f"leg {k} of {len(legs)}: {SEPARATED}"
+            reason = f"leg {k} of {len(legs)}: {separated(legs[k - 1])}"
             return without_path(whole, self.planner.name, Status.UNREACHABLE, reason)
         solutions: list[Solution] = []
         for k, leg in enumerate(legs, start=1):

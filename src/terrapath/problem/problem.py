@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import BlockedError, InputError, OutsideSurfaceError
+from ..errors import BlockedError, InputError, OutsideSurfaceError, SnapWarning, tell
 from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import Spacing, default_spacing
 from ..surface import Mask, Surface, metric
@@ -21,6 +22,11 @@ from .path import Path
 if TYPE_CHECKING:
     from ..space.constraints import Area, Constraints
     from ..space.slope_limit import SlopeLimit, SlopeMeasure
+
+
+def as_text(point: Point) -> str:
+    """A place on the plane, for messages."""
+    return f"({point[0]:.10g}, {point[1]:.10g})"
 
 
 class Problem:
@@ -35,7 +41,10 @@ class Problem:
     its weight, is steeper. slope_measure : "horn", the slope of a cell as GIS tools compute it, or
     "steepest", that of the steepest place in it. keep_in : shapely polygon or polygons that the
     vehicle must not leave.
-    name : shown in reports.
+    snap : map units. Start and goal that are not on free ground are moved to the nearest that is,
+    no farther than this, with a ``SnapWarning``; by default they are refused. name : shown in
+    reports.
+    show : how messages write a place (x1, x2), as in the user's own coordinates.
 
     ``obstacles`` are those given; ``free_space`` is where the vehicle's centre may be.
     Raises OutsideSurfaceError, BlockedError or InputError, naming the value and the remedy.
@@ -53,10 +62,13 @@ class Problem:
         max_slope: float | None = None,
         slope_measure: SlopeMeasure = "horn",
         keep_in: Area | None = None,
+        snap: float = 0.0,
         name: str = "",
+        show: Callable[[Point], str] = as_text,
     ) -> None:
         self.surface = surface
         self.name = name
+        self._show = show
         self.bounds = self._make_bounds(surface, bounds)
         try:
             given = (obstacles,) if isinstance(obstacles, Obstacle) else tuple(obstacles)
@@ -65,7 +77,8 @@ class Problem:
                 f"obstacles={obstacles!r} is no list of obstacles; "
                 "give shapely geometries, Circle or Mask"
             ) from None
-        require_not_negative(radius=radius)
+        require_not_negative(radius=radius, snap=snap)
+        self.snap = float(snap)
         self.obstacles: tuple[Obstacle, ...] = given
         self.radius = float(radius)
         self.max_slope = max_slope
@@ -73,7 +86,7 @@ class Problem:
         self.keep_in = keep_in
         self.free_space = self._free_space()
         self.start = self.checked(start, "start")
-        self.goal = self.checked(goal, "goal")
+        self.goal = self.start if goal is start else self.checked(goal, "goal")
 
     def _free_space(self) -> FreeSpace:
         limits = (self.surface.nodata, self.max_slope, self.keep_in)
@@ -128,18 +141,34 @@ class Problem:
     def checked(self, value: PointLike, name: str) -> Point:
         """A point of free space, (x1, x2), map units. name : what errors call it.
 
+        It is the nearest free one to the point given, where that is no farther than ``snap``.
         Raises InputError for what is no point, OutsideSurfaceError outside the bounds,
         BlockedError on what the vehicle has to keep away from.
         """
         point = as_point(value, name)
         if not self.bounds.contains(np.array(point)):
-            shown = f"{name}=({point[0]:.10g}, {point[1]:.10g}) is outside the bounds {self.bounds}"
+            shown = f"{name}={self._show(point)} is outside the bounds {self.bounds}"
             raise OutsideSurfaceError(f"{shown}; check the axis order or the CRS")
         if self.free_space.blocker(point) is None:
             return point
-        blocker = self.constraints.blocker(point, self.surface.unit)
-        shown = f"{name}=({point[0]:.10g}, {point[1]:.10g})"
-        raise BlockedError(f"{shown} is {blocker}; move it to free ground")
+        return self._freed(point, name)
+
+    def _freed(self, point: Point, name: str) -> Point:
+        """The free place that a blocked one is moved to; BlockedError where that is too far."""
+        from ..space.nearest import nearest_free
+
+        unit = self.surface.unit
+        blocker = f"{name}={self._show(point)} is {self.constraints.blocker(point, unit)}"
+        nearest = nearest_free(self.free_space, point)
+        if nearest is None:
+            raise BlockedError(f"{blocker}; no place within the bounds is free")
+        place, distance = nearest
+        there = f"{self._show(place)}, {distance:.4g} {unit}".rstrip()
+        if distance <= self.snap:
+            tell(SnapWarning(f"{blocker}; it is moved to {there} away"))
+            return place
+        remedy = f"move it there, or allow snap={_rounded_up(distance):g}"
+        raise BlockedError(f"{blocker}; the nearest free place is {there} away: {remedy}")
 
     def between(self, start: PointLike, goal: PointLike) -> Problem:
         """The same problem with another start and goal, (x1, x2), map units.
@@ -210,6 +239,12 @@ class Problem:
             known.get(key, "?") for key in ("start", "goal", "bounds", "surface")
         )
         return f"Problem({name}{start} to {goal} within {bounds}; {surface!r})"
+
+
+def _rounded_up(distance: float) -> float:
+    """A distance with two digits that is no shorter."""
+    unit = 10.0 ** (math.floor(math.log10(distance)) - 1)
+    return math.ceil(distance / unit) * unit
 
 
 def _cells_of(mask: Mask) -> Cells:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from ..problem import Problem
     from ..surface import Surface
     from ..surface.bounds import Bounds
+    from ..surface.georeference import Georeference
 
 
 class Place(NamedTuple):
@@ -136,6 +137,8 @@ class Question:
             radius=limits.radius,
             max_slope=limits.max_slope,
             slope_measure=limits.slope_measure,
+            snap=self.scenario.route.snap,
+            show=OwnCoordinates(place.surface.georeference, self.scenario.route.latlon),
             keep_in=self._area(place.surface, corridor),
             name=place.name,
         )
@@ -220,6 +223,24 @@ def on_plane(surface: Surface, point: Point, name: str, *, latlon: bool) -> Poin
     name : of the point, for messages. Raises InputError where the point is off the map.
     """
     return _from_latlon(surface, point, name) if latlon else _from_map(surface, point, name)
+
+
+@dataclass(frozen=True)
+class OwnCoordinates:
+    """Writes a place on the plane as the user gave places: of the map, or latitude, longitude."""
+
+    reference: Georeference | None
+    latlon: bool
+
+    def __call__(self, point: Point) -> str:
+        """As (X, Y), or (latitude, longitude) to a centimetre."""
+        reference, place = self.reference, np.array(point)
+        if reference is not None and self.latlon:
+            longitude, latitude = reference.to_lonlat(place)
+            return f"({latitude:.7f}, {longitude:.7f})"
+        if reference is not None and not reference.is_map_crs:
+            place = reference.to_map(place)
+        return f"({place[0]:.10g}, {place[1]:.10g})"
 
 
 def _shown(name: str, point: Point) -> str:

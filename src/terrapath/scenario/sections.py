@@ -74,6 +74,14 @@ class RouteSection:
             "--latlon/--no-latlon",
         ),
     ] = False
+    snap: Annotated[
+        float,
+        a_number(
+            "Move start, goal and via to the nearest free ground, no farther than this, map units "
+            "[default: 0, refuse them].",
+            "DISTANCE",
+        ),
+    ] = 0.0
     bounds: Annotated[
         Rectangle | None,
         Option(

@@ -18,10 +18,13 @@ from ..planners.corridor import factor
 from ..problem.scenes import SCENES, load
 from ..space.free_space import FreeSpace
 from ..surface import Surface
+from ..surface.bounds import Bounds
+from ..validation import require_not_negative
 from .answers import MOST_CELLS
 from .option import Declared, Point, declared
 from .question import require_map
 from .scenario import SECTIONS, LayerTable, options
+from .sections import ConstraintsSection
 
 # Words that name heights in the description of a band.
 HEIGHT_WORDS = ("height", "elevation", "altitude", "dem", "dtm", "dsm", "topograph")
@@ -46,26 +49,41 @@ class Band(NamedTuple):
         return f"{self.number} {self.description or 'without a description'}{unit}"
 
 
-def template(where: str, file: str | Path = "scenario.toml", *, crs: str | None = None) -> str:
+def template(
+    where: str,
+    file: str | Path = "scenario.toml",
+    *,
+    crs: str | None = None,
+    constraints: Mapping[str, object] | None = None,
+) -> str:
     """The text of a scenario to begin with: every key with its help, and a route.
 
     where : a built-in scene, a raster, or another name that GDAL can read. file : the file that
     the text is for; paths in it are relative to its folder. crs : of a raster that has none.
+    constraints : values of that section by key, which the text has and the route keeps to.
     Start and goal on a raster are guessed: free places far apart that a path connects.
     Raises MapError where the raster cannot be read, or has no two such places.
     """
+    limits = ConstraintsSection(**(constraints or {}))  # type: ignore[arg-type] # checked in use
     if where in SCENES:
-        return _of_scene(where)
-    return _of_map(where, Path(file), crs)
+        return _of_scene(where, Path(file), limits)
+    return _of_map(where, Path(file), crs, limits)
 
 
-def _of_scene(name: str) -> str:
+def _of_scene(name: str, file: Path, limits: ConstraintsSection) -> str:
     problem = load(name)
-    ends = _ends(problem.surface, (problem.start, problem.goal))
-    return _template({("map", "scene"): _text(name), **ends}, f"the built-in scene {name}", [])
+    ends = problem.start, problem.goal
+    if limits != ConstraintsSection():
+        ends = _guess(problem.surface, _free_space(problem.surface, problem.bounds, limits))
+    values = {
+        ("map", "scene"): _text(name),
+        **_ends(problem.surface, ends),
+        **_given(limits, file),
+    }
+    return _template(values, f"the built-in scene {name}", [])
 
 
-def _of_map(where: str, file: Path, crs: str | None) -> str:
+def _of_map(where: str, file: Path, crs: str | None, limits: ConstraintsSection) -> str:
     from ..io.maps import open_map
     from ..io.sources import require_safe
 
@@ -76,16 +94,61 @@ def _of_map(where: str, file: Path, crs: str | None) -> str:
     with open_map(where, height_band=height, crs=crs) as opened:
         # On a large map, start and goal are guessed on a coarser copy.
         surface = opened.surface(decimate=factor(opened.cells(), MOST_CELLS))
-    path = Path(where)
-    name = Path(os.path.relpath(path, file.parent)).as_posix() if path.exists() else where
+    assert surface.bounds is not None
+    name = _relative(where, file)
     values = {
         ("map", "path"): _text(name),
         ("map", "height_band"): str(height),
-        **_ends(surface, _guess(surface)),
+        **_ends(surface, _guess(surface, _free_space(surface, surface.bounds, limits))),
+        **_given(limits, file),
     }
     if crs is not None:
         values["map", "crs"] = _text(crs)
-    return _template(values, path.name, _band_lines(bands, height, name))
+    return _template(values, Path(where).name, _band_lines(bands, height, name))
+
+
+def _relative(name: str, file: Path) -> str:
+    """A path as a file names it; a name that is no path stays as it is."""
+    path = Path(name)
+    return Path(os.path.relpath(path, file.parent)).as_posix() if path.exists() else name
+
+
+def _given(limits: ConstraintsSection, file: Path) -> dict[tuple[str, str], str]:
+    """The constraints that are given, as TOML, with paths relative to the folder of a file."""
+    values = {}
+    for entry in options("constraints"):
+        value = getattr(limits, entry.key)
+        if value == entry.default:
+            continue
+        if entry.option.is_file:
+            is_one = isinstance(value, str)
+            names = [_relative(name, file) for name in ([value] if is_one else value)]
+            value = names[0] if is_one else names
+        values["constraints", entry.key] = json.dumps(value, ensure_ascii=False)
+    return values
+
+
+def _free_space(surface: Surface, bounds: Bounds, limits: ConstraintsSection) -> FreeSpace:
+    """Where the vehicle's centre may be."""
+    from ..io import read_area, read_obstacles
+    from ..space.constraints import Constraints, outside_of
+    from ..space.slope_limit import SlopeLimit
+
+    require_not_negative(radius=limits.radius)
+    steepest = outside = None
+    if limits.max_slope is not None:
+        around = bounds.widened(limits.radius)
+        steepest = SlopeLimit(surface, limits.max_slope, around, limits.slope_measure)
+    if limits.keep_in is not None:
+        outside = outside_of(read_area(limits.keep_in, surface), bounds, limits.radius)
+    return Constraints(
+        bounds=bounds,
+        obstacles=tuple(o for name in limits.obstacles for o in read_obstacles(name, surface)),
+        nodata=surface.nodata,
+        slope_limit=steepest,
+        outside=outside,
+        radius=limits.radius,
+    ).free_space()
 
 
 def _bands(where: str) -> list[Band]:
@@ -114,16 +177,14 @@ def _height_band(bands: list[Band]) -> int:
 # Start and goal
 
 
-def _guess(surface: Surface) -> tuple[Point, Point]:
+def _guess(surface: Surface, space: FreeSpace) -> tuple[Point, Point]:
     """Two free places far apart that a path connects, on the plane."""
-    bounds = surface.bounds
-    assert bounds is not None
+    bounds = space.bounds
     along = np.linspace(0.1, 0.9, PLACES)
     places = [
         (bounds.x1_min + u * bounds.width, bounds.x2_min + v * bounds.height)
         for v, u in itertools.product(along, along)
     ]
-    space = FreeSpace(bounds, [] if surface.nodata is None else [surface.nodata])
     connected: list[list[Point]] = []
     for place in (_rounded(surface, place) for place in places):
         if not bounds.contains(np.array(place)) or space.blocker(place) is not None:

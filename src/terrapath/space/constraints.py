@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -55,6 +55,31 @@ class Constraints:
 
             given = inflated(given, self.radius, self.bounds)
         return FreeSpace(self.bounds, given)
+
+    def separating(self, a: Point, b: Point) -> str:
+        """What separates two free places, in words: all that does so by itself, or all together."""
+        nothing = replace(self, obstacles=(), nodata=None, slope_limit=None, outside=None)
+        alone = [
+            (self._steepness, replace(nothing, slope_limit=self.slope_limit)),
+            ("cells without data lie", replace(nothing, nodata=self.nodata)),
+            ("obstacles lie", replace(nothing, obstacles=self.obstacles)),
+            ("the edge of keep_in lies", replace(nothing, outside=self.outside)),
+        ]
+        found = [what for what, limits in alone if limits.free_space().separates(a, b)]
+        if found:
+            return " and ".join(found)
+        kinds = (self.slope_limit, self.nodata, self.obstacles or None, self.outside)
+        given = [what for (what, _), kind in zip(alone, kinds, strict=True) if kind is not None]
+        return " and ".join(given) + ", together,"
+
+    @property
+    def _steepness(self) -> str:
+        """How much ground is too steep, in words."""
+        if self.slope_limit is None or self.steep is None:
+            return "no too steep ground lies"
+        share = 100.0 * float(self.steep.blocked.mean())
+        limit = f"max_slope={self.slope_limit.max_slope:g}"
+        return f"ground steeper than {limit} degrees ({share:.3g} % of the cells) lies"
 
     def blocker(self, point: Point, unit: str = "") -> str:
         """Why a point is not free, in words. One of the inflated obstacles must hold it.

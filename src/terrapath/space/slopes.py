@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..surface import Surface
-from ..surface.carrying import Native, few_rows, heights_at, sampled, without_data
+from ..surface.carrying import Native, few_rows, heights_at, sampled
 from ..surface.holes import continue_into_holes
 from ..surface.places import Places
 from ..surface.raster import Grid
@@ -124,9 +124,8 @@ class CarriedHornRows:
         slopes = horn_of_map(self.surface, native)
         if native.missing is not None:
             continue_into_holes(slopes, native.missing)
-        found = np.maximum(sampled(slopes, native.grid, self.cells), 0.0)
-        found[without_data(native.missing, native.grid, self.cells)] = 0.0
-        return found
+        # Beyond the map and in holes they go on, so that no slit is left beside cells without data.
+        return np.maximum(sampled(slopes, native.grid, self.cells), 0.0)
 
 
 def horn_of_map(surface: Surface, native: Native) -> Array:

@@ -61,7 +61,7 @@ def carried_surface(
     """
     grid = raster.grid
     plane = grid.planning_grid()
-    plane, blocked = _trimmed(plane, without_data(missing, grid, plane))
+    plane, blocked = _trimmed(plane, _without_data(missing, grid, plane))
     fine = _finer(grid, plane)
     values = np.empty((len(kinds), fine.rows, fine.columns))
     for band, kind, out in zip(raster.bands, kinds, values, strict=True):
@@ -98,7 +98,7 @@ def _finer(grid: Grid, plane: Grid) -> Grid:
 # Blocked cells
 
 
-def without_data(missing: Cells | None, grid: Grid, plane: Grid) -> Cells:
+def _without_data(missing: Cells | None, grid: Grid, plane: Grid) -> Cells:
     """Which cells of the plane lie with their centre in a missing cell, or outside the map."""
     places, found = Places(grid, plane), np.empty((plane.rows, plane.columns), np.bool_)
     for rows in few_rows(plane):

@@ -1,0 +1,55 @@
+"""The free place that is nearest to a place that is not free."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import shapely
+
+from ..validation import Array, Point
+from .free_space import FreeSpace
+
+# Places are tried on squares around the point, each twice as wide as the one before, from this
+# share of the bounds on. On a side there are so many, and then more, no farther than the free one.
+FIRST, PLACES, CLOSER = 1e-6, 24, 64
+
+
+def nearest_free(space: FreeSpace, point: Point) -> tuple[Point, float] | None:
+    """A free place within the bounds near a point, and its distance, map units; None without one.
+
+    It is the nearest to a few hundredths of its distance, unless free ground is narrower than that.
+    """
+    reach = FIRST * math.hypot(space.bounds.width, space.bounds.height)
+    farthest = 2.0 * math.hypot(space.bounds.width, space.bounds.height)
+    while reach < farthest:
+        found = _nearest_on_square(space, point, reach, PLACES)
+        if found is not None:
+            return _nearest_on_square(space, point, found[1], CLOSER) or found
+        reach *= 2.0
+    return None
+
+
+def _nearest_on_square(
+    space: FreeSpace, point: Point, reach: float, count: int
+) -> tuple[Point, float] | None:
+    """The nearest free one among places on a square around a point."""
+    steps = np.linspace(-reach, reach, 2 * count + 1)
+    places = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) + point
+    distances = np.hypot(*(places - point).T)
+    places = places[np.argsort(distances, kind="stable")]
+    for place in places[_may_be_free(space, places)].tolist():
+        x, y = place
+        if space.blocker((x, y)) is None:
+            return (x, y), math.hypot(x - point[0], y - point[1])
+    return None
+
+
+def _may_be_free(space: FreeSpace, places: Array) -> npt.NDArray[np.bool_]:
+    """(m,), which places are in the bounds, and in no obstacle as far as is quick to tell."""
+    maybe = space.bounds.contains(places)
+    maybe[maybe] = space.segments_are_free(places[maybe], places[maybe])
+    for geometry in space.geometries:
+        maybe[maybe] = ~shapely.intersects_xy(geometry, *places[maybe].T)
+    return np.asarray(maybe)

@@ -1,0 +1,127 @@
+"""The nearest free place, beside a search among many places by shapely."""
+
+import numpy as np
+import pytest
+import shapely
+
+import terrapath as tp
+from terrapath.cli.main import run
+from terrapath.space.free_space import FreeSpace
+from terrapath.space.nearest import nearest_free
+from terrapath.surface.bounds import Bounds
+
+BOUNDS = Bounds(0.0, 0.0, 20.0, 20.0)
+FLAT = tp.Surface.from_peaks([[]])
+
+
+def squares(mask):
+    """The cells of a mask that are blocked, as one geometry."""
+    (j, i), (dx, dy) = np.nonzero(mask.blocked), mask.spacing
+    x, y = mask.x[i], mask.y[j]
+    return shapely.union_all(shapely.box(x - 0.5 * dx, y - 0.5 * dy, x + 0.5 * dx, y + 0.5 * dy))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_it_is_the_nearest_place_outside_all_obstacles(seed):
+    random = np.random.default_rng(seed)
+    axis = np.arange(20) + 0.5
+    mask = tp.Mask(random.random((20, 20)) < 0.6, axis, axis)
+    shapes = [shapely.Point(*random.uniform(4, 16, 2)).buffer(random.uniform(1, 3)) for _ in "abc"]
+    disc = tp.Circle(*random.uniform(4, 16, 2), 1.5)
+    space = FreeSpace(BOUNDS, [mask, *shapes, disc])
+    disc_shape = shapely.Point(disc.x1, disc.x2).buffer(disc.radius, 64)
+    blocked = shapely.union_all([squares(mask), *shapes, disc_shape])
+    free = shapely.box(*BOUNDS) - blocked
+    for point in random.uniform(0.5, 19.5, (10, 2)):
+        here = shapely.Point(point)
+        if not blocked.contains(here):
+            continue
+        least = here.distance(free)
+        place, distance = nearest_free(space, tuple(point))
+        assert space.blocker(place) is None
+        assert distance == pytest.approx(np.hypot(*(np.array(place) - point)))
+        assert least - 0.01 <= distance <= 1.06 * least + 0.01
+
+
+def test_without_a_free_place_there_is_none():
+    space = FreeSpace(BOUNDS, [shapely.box(-1, -1, 21, 21)])
+    assert nearest_free(space, (3.0, 4.0)) is None
+    with pytest.raises(tp.InputError, match="no place within the bounds is free"):
+        tp.Problem(FLAT, (3, 4), (5, 5), BOUNDS, [shapely.box(-1, -1, 21, 21)])
+
+
+WALL = shapely.box(4, 4, 9, 16)
+
+
+def test_start_and_goal_are_moved_no_farther_than_allowed_and_this_is_said():
+    with pytest.raises(tp.InputError, match=r"start=\(5, 10\) is inside an obstacle; the nearest"):
+        tp.Problem(FLAT, (5, 10), (15, 10), BOUNDS, [WALL], snap=0.9)
+    with pytest.warns(tp.errors.SnapWarning, match=r"it is moved to \(3\.9"):
+        problem = tp.Problem(FLAT, (5, 10), (15, 10), BOUNDS, [WALL], snap=1.2)
+    assert 3.9 < problem.start[0] < 4.0
+    assert problem.goal == (15.0, 10.0)
+    assert problem.between((15, 10), (3, 3)).start == (15.0, 10.0)
+    with pytest.raises(tp.InputError, match="snap"):
+        tp.Problem(FLAT, (5, 10), (15, 10), BOUNDS, [WALL], snap=-1)
+
+
+def test_what_is_suggested_is_free_and_near_enough():
+    with pytest.raises(tp.InputError) as caught:
+        tp.Problem(FLAT, (5.3, 10), (15, 10), BOUNDS, [WALL])
+    shown = str(caught.value).split("allow snap=")[1]
+    with pytest.warns(tp.errors.SnapWarning):
+        tp.Problem(FLAT, (5.3, 10), (15, 10), BOUNDS, [WALL], snap=float(shown))
+
+
+def steep_map(path):
+    """A ramp of 60 degrees in the middle of flat ground, in degrees; its file's name."""
+    from rasterio import Affine
+
+    from rasters import write
+
+    rise = np.clip(np.arange(60) - 25, 0, 10) * 60.0
+    cell = 1 / 3600
+    transform = Affine(cell, 0.0, 11.0, 0.0, -cell, 47.0)
+    return str(write(path / "ramp.tif", np.tile(rise, (50, 1)), transform, "EPSG:4326"))
+
+
+def test_refusals_and_moves_are_in_the_users_own_coordinates(tmp_path, capsys):
+    path = steep_map(tmp_path)
+    for latlon, start, goal, near in (
+        (["--latlon"], "46.993,11.00835", "46.993,11.002", "(46.99"),
+        ([], "11.00835,46.993", "11.002,46.993", "(11.00"),
+    ):
+        asked = ["plan", path, "--start", start, "--goal", goal, "--max-slope", "40", "--quiet"]
+        assert run([*asked, *latlon]) == 2
+        said = capsys.readouterr().err
+        assert "degrees by Horn's formula, steeper than max_slope=40" in said
+        assert f"the nearest free place is {near}" in said
+        place = said.split("nearest free place is (")[1].split(")")[0].replace(" ", "")
+        assert run([*asked, *latlon, "--start", place]) == 0
+        capsys.readouterr()
+        assert run([*asked, *latlon, "--snap", "300"]) == 0
+        assert f"it is moved to {near}" in capsys.readouterr().err
+
+
+def test_what_separates_start_and_goal_is_named(tmp_path, capsys):
+    path = steep_map(tmp_path)
+    ends = ["--latlon", "--start", "46.993,11.002", "--goal", "46.993,11.0150"]
+    assert run(["plan", path, *ends, "--max-slope", "40", "--quiet"]) == 4
+    assert "ground steeper than max_slope=40 degrees (" in capsys.readouterr().err
+
+
+def test_a_scenario_with_constraints_keeps_to_them(tmp_path, capsys):
+    path, file = steep_map(tmp_path), tmp_path / "ramp.toml"
+    area = tmp_path / "area.geojson"
+    area.write_text(
+        '{"type": "Polygon", "coordinates": [[[11.0005, 46.987], [11.012, 46.987], '
+        "[11.012, 46.9995], [11.0005, 46.9995], [11.0005, 46.987]]]}"
+    )
+    limits = ["--max-slope", "40", "--radius", "15", "--keep-in", str(area)]
+    assert run(["init", path, "--output", str(file), *limits]) == 0
+    text = file.read_text()
+    assert "\nmax_slope = 40.0" in text
+    assert "\nradius = 15.0" in text
+    assert '\nkeep_in = "area.geojson"' in text
+    capsys.readouterr()
+    assert run(["plan", str(file), "--quiet"]) == 0
