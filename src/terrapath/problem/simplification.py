@@ -33,9 +33,9 @@ def default_tolerance(problem: Problem) -> float:
 
 def cell_size(problem: Problem) -> float:
     """A cell of the map, map units; where there are no cells, the finest feature."""
-    data, size = problem.surface.data, problem.surface.resolution
-    if isinstance(data, Spline):
-        size = min(size, data.dx, data.dy)
+    surface, size = problem.surface, problem.surface.resolution
+    if isinstance(surface.data, Spline) and surface.fit.smoothing is not None:
+        size = min(size, surface.data.dx, surface.data.dy)  # features are larger than cells
     return size if math.isfinite(size) else min(problem.default_spacing)
 
 
