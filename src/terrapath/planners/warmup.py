@@ -106,6 +106,18 @@ def _search_grid(surface: Surface) -> None:
 def _measure(surface: Surface) -> None:
     line_r(surface, START, GOAL)
     chord(surface, START, GOAL)
+    if surface.is_raster:
+        _read_degrees()
+
+
+def _read_degrees() -> None:
+    """A map in degrees, which is carried onto a plane."""
+    from ..surface.raster import Raster
+
+    heights = np.add.outer(np.arange(8.0), np.arange(8.0))[None]
+    Raster.from_extent(heights, (11.0, 47.0, 11.01, 47.01), "EPSG:4326").to_surface(
+        names=["height"]
+    )
 
 
 def _shoot(surface: Surface) -> None:
