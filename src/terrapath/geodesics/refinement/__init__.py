@@ -12,10 +12,12 @@ from ..._support.watching import MustStop, never, stop_after
 from ...errors import InputError, UnfinishedWarning, tell
 from ...problem import Path, Problem
 from ...surface import Surface
+from ...surface.metric import feature_size, is_rough
 from ...validation import Array, as_array, require_positive
 from ..cell_routes import polished
 from .curve import curve_through
-from .newton import correct, placed_parameters, shortest_polyline
+from .lanes import along, shortened
+from .newton import correct, lift, placed_parameters, shortest_polyline
 
 __all__ = ["refine", "shortest_polyline"]
 
@@ -32,6 +34,12 @@ STAGES = 3
 SAME_PLACE = 1e-9
 # The path found may be longer than the one given by this share, which allows for rounding.
 ROUNDING = 1e-12
+
+# The energy of a polyline, taken as a length, is at most this many times its length where pieces
+# are short enough for a model of smooth ground. On the roughest ground they are not.
+SMOOTH = 1.1
+# Features this many times as long as wide are too many for a model that takes them as round.
+LONG = 4.0
 
 NO_ROOM = "a path could not be refined: obstacles leave no room to pull it taut; it stays as it was"
 
@@ -53,7 +61,10 @@ def refine(
     near to them the path given passes. It is never longer than the path given, stays in free
     space, and passes each obstacle on the same side. Where obstacles leave no room to pull the
     path taut, it is returned as it was, with an UnfinishedWarning. Where costs are constant in
-    cells, its bends move along the sides of cells to where it is shortest. time_limit : seconds.
+    cells, its bends move along the sides of cells to where it is shortest. On rough ground the path
+    is first shortened by true lengths, on 2 to 16 points for each feature of the surface. Where the
+    ground is too rough for the exact geodesic, that is the path returned; where even finer points
+    would shorten it by a percent or more, an UnfinishedWarning says so. time_limit : seconds.
     must_stop : is asked many times a second whether to stop; from then on it must say True. Where
     time is up, or it says so, the path is the best one so far.
     Raises InputError where the path does not join start and goal, or is not in free space.
@@ -63,10 +74,33 @@ def refine(
         require_positive(time_limit=time_limit)
         must_stop = stop_after(time_limit, must_stop)
     given = problem.path(_checked(problem, path))
+    is_hard = given.length > 0.0 and not must_stop() and _is_hard(problem)
     if problem.surface.cost_cells is not None:
-        return polished(problem, given, must_stop)
-    best, is_pulled = given, given.length == 0.0
-    for points in _refined(problem, given, tolerance, must_stop):
+        shorter = _shortened(problem, given, must_stop) if is_hard else given
+        return polished(problem, shorter, must_stop)
+    if is_hard:
+        return _refined_on_rough_ground(problem, given, tolerance, must_stop)
+    best, is_pulled = _pulled(problem, given, tolerance, must_stop)
+    if not (is_pulled or given.length == 0.0 or must_stop()):
+        tell(UnfinishedWarning(NO_ROOM))
+    return best
+
+
+def _is_hard(problem: Problem) -> bool:
+    """Is the ground rough, or are features much longer along one axis than along the other?"""
+    x, y = feature_size(problem.surface)
+    return max(x, y) > LONG * min(x, y) or is_rough(problem.surface, problem.bounds)
+
+
+def _pulled(
+    problem: Problem, given: Path, tolerance: float, must_stop: MustStop, is_near: bool = False
+) -> tuple[Path, bool]:
+    """The path pulled taut on smooth ground, and whether it could be pulled at all.
+
+    is_near : is the path given nearly taut? Then it is not pulled in coarse pieces first.
+    """
+    best, is_pulled = given, False
+    for points in _refined(problem, given, tolerance, must_stop, is_near):
         if not problem.allows(points):
             continue
         found, is_pulled = problem.path(points), True
@@ -76,9 +110,34 @@ def refine(
             best = found
         if must_stop():
             break
-    if not is_pulled and not must_stop():
-        tell(UnfinishedWarning(NO_ROOM))
+    return best, is_pulled
+
+
+def _shortened(problem: Problem, given: Path, must_stop: MustStop) -> Path:
+    """The path shortened by true lengths, as far as any number of points can."""
+    made = shortened(problem, given.points, must_stop)
+    if not (made.is_settled or must_stop()):
+        tell(UnfinishedWarning(made.remark))
+    return min(given, problem.path(made.points), key=lambda path: path.length)
+
+
+def _refined_on_rough_ground(
+    problem: Problem, given: Path, tolerance: float, must_stop: MustStop
+) -> Path:
+    """The path shortened by true lengths, then pulled taut where the ground is smooth enough."""
+    best = _shortened(problem, given, must_stop)
+    if _is_resolved(problem.surface, best):
+        return _pulled(problem, best, tolerance, must_stop, is_near=True)[0]
     return best
+
+
+def _is_resolved(surface: Surface, path: Path) -> bool:
+    """Are the pieces of a polyline short enough for a model of smooth ground?"""
+    pieces = _stages(_features(surface, path))[-1]
+    if pieces == MOST_PIECES:
+        return False
+    energy = lift(surface, along(path.points, pieces)).energy
+    return math.sqrt(energy) <= SMOOTH * path.length
 
 
 def _checked(problem: Problem, path: Path | npt.ArrayLike) -> Array:
@@ -130,20 +189,20 @@ def _require_free(problem: Problem, points: Array) -> None:
 
 
 def _refined(
-    problem: Problem, given: Path, tolerance: float, must_stop: MustStop
+    problem: Problem, given: Path, tolerance: float, must_stop: MustStop, is_near: bool
 ) -> Iterator[Array]:
     """Polylines (m, 2) that may be shorter; the last is most likely the shortest."""
     space = problem.free_space
     if given.length == 0.0 or must_stop():
         return
     if not (space.geometries or space.circles or space.masks):
-        candidates = _geodesics(problem.surface, given, tolerance, must_stop)
+        candidates = _geodesics(problem.surface, given, tolerance, must_stop, is_near)
         if all(problem.bounds.contains(points).all() for points in candidates):
             yield from candidates
             return
     from .taut import taut_paths
 
-    yield from taut_paths(problem, given.points, tolerance, must_stop)
+    yield from taut_paths(problem, given.points, tolerance, must_stop, is_near)
 
 
 def _features(surface: Surface, given: Path) -> float:
@@ -154,7 +213,7 @@ def _features(surface: Surface, given: Path) -> float:
     """
     length = given.length
     if surface.costs:
-        length /= float(surface.cost(_along(given.points, MOST_PIECES)).min())
+        length /= float(surface.cost(along(given.points, MOST_PIECES)).min())
     return length / surface.resolution
 
 
@@ -165,21 +224,16 @@ def _stages(features: float) -> tuple[int, ...]:
     return tuple(round(count) for count in np.geomspace(first, last, STAGES))
 
 
-def _along(points: Array, pieces: int) -> Array:
-    """Points at equal distances along a polyline on the plane."""
-    reached = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    places = np.linspace(0.0, reached[-1], pieces + 1)
-    return np.column_stack([np.interp(places, reached, axis) for axis in points.T])
-
-
-def _geodesics(surface: Surface, given: Path, tolerance: float, must_stop: MustStop) -> list[Array]:
+def _geodesics(
+    surface: Surface, given: Path, tolerance: float, must_stop: MustStop, is_near: bool
+) -> list[Array]:
     """The geodesic near a path, as a polyline (m, 2), as if there were no obstacles.
 
     Where the surface is too rough for the geodesic to be exact, the polyline of least energy comes
     before it. Where it must stop, only the polyline as far as it is pulled.
     """
-    stages = _stages(_features(surface, given))
-    polyline = shortest_polyline(surface, _along(given.points, stages[0]), stages, must_stop)
+    stages = _stages(_features(surface, given))[-1 if is_near else 0 :]
+    polyline = shortest_polyline(surface, along(given.points, stages[0]), stages, must_stop)
     if must_stop():
         return [polyline]
     corrected = correct(surface, polyline)

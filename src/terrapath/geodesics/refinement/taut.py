@@ -18,13 +18,9 @@ from .clear import is_clear, moved_clear
 from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
 from .curve import curve_through
 from .newton import correct, placed_parameters, settle
-from .walls import FEWEST_SIDES, MOST_SIDES, Surroundings, surroundings
+from .walls import FEWEST_SIDES, MOST_SIDES, Surroundings, surroundings, widest_clearance
 
-# The distance between a path and what it touches, as a share of the region's side.
-CLEARANCE = 1e-8
-# And at least this share of the largest coordinate, so that it is far above rounding.
-LEAST_CLEARANCE = 2.0**-46
-# Where obstacles leave no room for that, a tenth of the clearance is tried, and so on.
+# Where obstacles leave no room for the widest clearance, a tenth of it is tried, and so on.
 CLEARANCE_ATTEMPTS = 4
 
 # Points that are nearer to one another than this, as a share of the region's side, are merged.
@@ -40,10 +36,11 @@ SMOOTHING_ROUNDS = 10
 
 
 def taut_paths(
-    problem: Problem, points: Array, tolerance: float, must_stop: MustStop
+    problem: Problem, points: Array, tolerance: float, must_stop: MustStop, is_near: bool = False
 ) -> Iterator[Array]:
     """Polylines (m, 2) from the one given towards the taut path; each is closer to it.
 
+    is_near : is the one given nearly taut? Then it is not pulled in coarse pieces first.
     Where it must stop, the next one is as far as the path is pulled.
     """
     surface, space = problem.surface, problem.free_space
@@ -53,7 +50,7 @@ def taut_paths(
     around, points = cleared
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
     band = Band.free(points)
-    for pieces in PIECES_PER_FEATURE:
+    for pieces in PIECES_PER_FEATURE[1 if is_near else 0 :]:
         longest = max(surface.resolution / pieces, length / MOST_PIECES)
         longest = min(longest, length / FEWEST_PIECES)
         band = adopted(around, subdivided(band, longest))
@@ -101,8 +98,7 @@ def _cleared(
     The clearance is the largest one that the path keeps or can be moved to keep; None where even
     the smallest one leaves no room, or where it must stop.
     """
-    largest = float(np.abs(space.bounds).max())
-    widest = max(CLEARANCE * space.bounds.side, LEAST_CLEARANCE * largest)
+    widest = widest_clearance(space)
     for attempt in range(CLEARANCE_ATTEMPTS):
         clearance = widest * 0.1**attempt
         sides = np.array([_sides_clear_of(points, c, clearance) for c in space.circles], int)

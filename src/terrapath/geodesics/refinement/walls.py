@@ -30,6 +30,11 @@ SHORTENED = 0.98
 CELL_MARGINS = 2.0
 # Sides of the polygons that replace discs; they grow by a factor of four.
 FEWEST_SIDES, MOST_SIDES = 64, 4096
+# The distance between a path and what it touches, as a share of the region's side.
+CLEARANCE = 1e-8
+# And at least this share of the largest coordinate, so that it is far above rounding.
+LEAST_CLEARANCE = 2.0**-46
+
 # A corner turns by more than this, radians.
 LEAST_TURN = 1e-9
 
@@ -186,6 +191,39 @@ def _bounds(bounds: Bounds, clearance: float) -> Outline:
     return Outline(edges, normals, np.full(4, clearance), empty, empty)
 
 
+def widest_clearance(space: FreeSpace) -> float:
+    """How far from obstacles walls and corners stand where there is room, map units."""
+    largest = float(np.abs(space.bounds).max())
+    return max(CLEARANCE * space.bounds.side, LEAST_CLEARANCE * largest)
+
+
+def _mask_clearance(space: FreeSpace, mask: Mask, clearance: float) -> float:
+    return clearance + CELL_MARGINS * cell_margin(mask, space.bounds) * max(mask.spacing)
+
+
+def corners_near(space: FreeSpace, points: Array, distance: float) -> tuple[Array, Array]:
+    """Where paths bend round obstacles within a distance of a path (m, 2), and their own corners.
+
+    Both (c, 2), map units; they are a clearance apart.
+    """
+    clearance, line = widest_clearance(space), shapely.linestrings(points)
+    parts = [_mask(mask, _mask_clearance(space, mask, clearance)) for mask in space.masks]
+    tree = shapely.STRtree(list(space.geometries))
+    for k in tree.query(line, predicate="dwithin", distance=distance):
+        parts += [_ring(ring, clearance) for ring in _rings(space.geometries[k])]
+    for circle in space.circles:
+        if shapely.dwithin(line, shapely.Point(circle.x1, circle.x2), circle.radius + distance):
+            disc = _disc(circle.x1, circle.x2, circle.radius, FEWEST_SIDES)
+            parts.append(_ring(disc, clearance))
+    if not parts:
+        return np.empty((0, 2)), np.empty((0, 2))
+    bends = np.concatenate([part.corners for part in parts])
+    tips = np.concatenate([part.tips for part in parts])
+    near = shapely.dwithin(line, shapely.points(bends), distance)
+    bends, tips = bends[near], tips[near]
+    return bends, bends - (bends - tips) / SLACK
+
+
 def surroundings(
     space: FreeSpace, clearance: float, sides: Indices, must_stop: MustStop = never
 ) -> Surroundings | None:
@@ -199,8 +237,7 @@ def surroundings(
             return None
         parts += [_ring(ring, clearance) for ring in _rings(geometry)]
     for mask in space.masks:
-        widened = CELL_MARGINS * cell_margin(mask, space.bounds) * max(mask.spacing)
-        parts.append(_mask(mask, clearance + widened))
+        parts.append(_mask(mask, _mask_clearance(space, mask, clearance)))
     plain = Outline.joined(parts)
     for circle, count in zip(space.circles, sides, strict=True):
         ring = _disc(circle.x1, circle.x2, circle.radius, int(count))
