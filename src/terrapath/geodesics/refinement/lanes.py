@@ -178,7 +178,7 @@ class _Ground:
     def gain_by_bending(self, points: Array) -> float:
         """By what share a path would be shorter if its pieces bent between their ends."""
         length = self.problem.path(points).length
-        return 1.0 - kernels.bent_length(self.problem.surface.data, points) / length
+        return 1.0 - float(kernels.bent_length(self.problem.surface.data, points)) / length
 
     def bends_beside(self, points: Array, distance: float) -> Array:
         """The nearest bend (m, 2) to each point within a distance in features; else NaN."""
