@@ -102,6 +102,7 @@ def routes_of_fields(
     if direct is None:
         return
     found: list[Path] = []
+    rival = math.inf
     value = float(fields[0].at(problem.goal))
     for tries, candidate in enumerate(_candidates(problem, fields, direct, value), 1):
         if only_shorter and len(found) >= count:
@@ -109,12 +110,14 @@ def routes_of_fields(
             doubt = min(abs(best / value - 1.0), MOST_DOUBT) + SAME_VALUE
             if candidate.value > best * (1.0 + doubt):
                 break
+            rival = best
         try:
-            route = refine(problem, candidate.path, must_stop=is_late)
+            route = refine(problem, candidate.path, must_stop=is_late, rival=rival)
         except Exception as error:
             failed(error)
         else:
-            if not any(is_same(problem, route, other) for other in found):
+            is_new = not any(is_same(problem, route, other) for other in found)
+            if is_new and route.length <= rival:
                 found.append(route)
                 yield route
         if tries >= TRIES * count or must_stop():

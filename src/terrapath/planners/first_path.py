@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
+from .._support.watching import never, stop_after
 from ..problem import Path, Problem
 from .base import (
     INTERRUPT,
@@ -15,6 +17,7 @@ from .base import (
     TreeOptions,
     seconds_left,
 )
+from .fast_marching import FastMarching
 from .grid_search import AStar
 
 # The first lattice has between so many nodes on a side, so that it shows valleys and gaps, and so
@@ -45,7 +48,10 @@ def path_over_lattices(
     straight : the straight line where that is free; the shorter path counts. The coarse lattice
     takes a moment, so only the others show their progress.
     """
-    coarse = AStar(spacing=coarse_spacing(problem, is_rough), neighbours=NEIGHBOURS)
+    spacing: float | None = coarse_spacing(problem, is_rough)
+    if is_rough and min(problem.default_spacing) >= 0.5 * coarse_spacing(problem, is_rough):
+        spacing = None  # nodes where the samples are, which is best on rough ground
+    coarse = AStar(spacing=spacing, neighbours=NEIGHBOURS)
     found = coarse.solve(problem, time_limit=options.time_limit)
     seconds = found.seconds
 
@@ -60,4 +66,26 @@ def path_over_lattices(
         seconds += found.seconds
     paths = [path for path in (found.path, straight) if path is not None]
     ended = found.stopped_by if found.stopped_by in (INTERRUPT, "callback") else ""
+    if is_rough and paths and not is_over:
+        started = time.perf_counter()
+        paths = _shorter(problem, paths, seconds_left(options.time_limit, seconds))
+        seconds += time.perf_counter() - started
     return FirstPath(min(paths, key=lambda path: path.length, default=None), seconds, ended)
+
+
+def _shorter(problem: Problem, paths: list[Path], time_limit: float | None) -> list[Path]:
+    """Paths on rough ground that a tree hardly finds, within a time limit, seconds.
+
+    There the shortest paths bend between the nodes of a lattice. A distance field allows for that,
+    so its path may lead through another valley. All are moved sideways to where they are shorter.
+    """
+    from ..geodesics.refinement.lanes import COARSE, STAGES, shortened
+
+    must_stop = never if time_limit is None else stop_after(time_limit)
+    field = FastMarching().solve(problem, time_limit=time_limit)
+    found = paths if field.path is None else [*paths, field.path]
+    for stages, count in ((COARSE, len(found)), (STAGES[2:3], 1)):
+        found.sort(key=lambda path: path.length)
+        moved = [shortened(problem, path.points, must_stop, stages) for path in found[:count]]
+        found += [problem.path(path.points) for path in moved]
+    return found

@@ -135,6 +135,14 @@ class _Run:
         known = self.found if self.direct is None else [*self.found, self.direct]
         return min((path.length for path in known), default=math.inf)
 
+    @property
+    def rival(self) -> float:
+        """The length that a further route must be below to be of use, map units."""
+        is_enough = len(self.found) >= self.planner.routes
+        return (
+            min((path.length for path in self.found), default=math.inf) if is_enough else math.inf
+        )
+
     def must_stop(self, settled: int = 0) -> bool:
         progress = Progress(
             self.samples + settled,
@@ -289,11 +297,13 @@ class _Run:
 
     def refine(self, path: Path) -> None:
         """Refine a candidate and keep it; where that fails, keep it as it is."""
+        rival = self.rival
         try:
-            path = refine(self.problem, path, must_stop=self.stopper.is_late)
+            path = refine(self.problem, path, must_stop=self.stopper.is_late, rival=rival)
         except Exception as error:
             self.failures.append(error)
-        self.keep(path)
+        if path.length <= rival:
+            self.keep(path)
 
     def refine_routes(self, direct: Path, count: int) -> None:
         """Refine the routes of the fields; each is kept as soon as it is done."""

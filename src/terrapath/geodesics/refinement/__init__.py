@@ -16,7 +16,7 @@ from ...surface.metric import feature_size, is_rough
 from ...validation import Array, as_array, require_positive
 from ..cell_routes import polished
 from .curve import curve_through
-from .lanes import along, shortened
+from .lanes import MUCH, along, shortened
 from .newton import correct, lift, placed_parameters, shortest_polyline
 
 __all__ = ["refine", "shortest_polyline"]
@@ -51,6 +51,7 @@ def refine(
     tolerance: float = TOLERANCE,
     time_limit: float | None = None,
     must_stop: MustStop = never,
+    rival: float = math.inf,
 ) -> Path:
     """The locally shortest path near a path: what it becomes when it is pulled taut.
 
@@ -66,7 +67,9 @@ def refine(
     ground is too rough for the exact geodesic, that is the path returned; where even finer points
     would shorten it by a percent or more, an UnfinishedWarning says so. time_limit : seconds.
     must_stop : is asked many times a second whether to stop; from then on it must say True. Where
-    time is up, or it says so, the path is the best one so far.
+    time is up, or it says so, the path is the best one so far. rival : the length of a path that
+    this one competes with, map units. On rough ground a path that will not become shorter than that
+    is returned as it was.
     Raises InputError where the path does not join start and goal, or is not in free space.
     """
     require_positive(tolerance=tolerance)
@@ -76,10 +79,10 @@ def refine(
     given = problem.path(_checked(problem, path))
     is_hard = given.length > 0.0 and not must_stop() and _is_hard(problem)
     if problem.surface.cost_cells is not None:
-        shorter = _shortened(problem, given, must_stop) if is_hard else given
+        shorter = _shortened(problem, given, must_stop, rival) if is_hard else given
         return polished(problem, shorter, must_stop)
     if is_hard:
-        return _refined_on_rough_ground(problem, given, tolerance, must_stop)
+        return _refined_on_rough_ground(problem, given, tolerance, must_stop, rival)
     best, is_pulled = _pulled(problem, given, tolerance, must_stop)
     if not (is_pulled or given.length == 0.0 or must_stop()):
         tell(UnfinishedWarning(NO_ROOM))
@@ -113,20 +116,21 @@ def _pulled(
     return best, is_pulled
 
 
-def _shortened(problem: Problem, given: Path, must_stop: MustStop) -> Path:
+def _shortened(problem: Problem, given: Path, must_stop: MustStop, rival: float) -> Path:
     """The path shortened by true lengths, as far as any number of points can."""
-    made = shortened(problem, given.points, must_stop)
-    if not (made.is_settled or must_stop()):
+    made = shortened(problem, given.points, must_stop, rival=rival)
+    if not (made.is_settled or made.is_hopeless or must_stop()):
         tell(UnfinishedWarning(made.remark))
     return min(given, problem.path(made.points), key=lambda path: path.length)
 
 
 def _refined_on_rough_ground(
-    problem: Problem, given: Path, tolerance: float, must_stop: MustStop
+    problem: Problem, given: Path, tolerance: float, must_stop: MustStop, rival: float
 ) -> Path:
     """The path shortened by true lengths, then pulled taut where the ground is smooth enough."""
-    best = _shortened(problem, given, must_stop)
-    if _is_resolved(problem.surface, best):
+    best = _shortened(problem, given, must_stop, rival)
+    is_worth_it = best.length * (1.0 - MUCH) <= rival
+    if is_worth_it and _is_resolved(problem.surface, best):
         return _pulled(problem, best, tolerance, must_stop, is_near=True)[0]
     return best
 

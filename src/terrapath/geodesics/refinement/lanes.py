@@ -10,6 +10,7 @@ pieces decide, so the path never becomes longer and never leaves free space.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -27,6 +28,7 @@ from .walls import corners_near
 # The spacing of points, stage by stage, in features of the surface; and a stage is over where the
 # path gains less than this share of its length, round after round.
 STAGES = ((0.5, 1e-4), (0.25, 1e-4), (0.125, 1e-5), (0.0625, 1e-6))
+COARSE = STAGES[:2]
 PATIENCE, MOST_ROUNDS = 4, 24
 MOST_POINTS = 16_384
 
@@ -41,6 +43,9 @@ SHRINKS, GROWS, STAYS = 0.25, 1.5, 0.4
 # Newton's method moves a point by at most so many reaches; a second place is so far on the way.
 FARTHEST, PART = 8.0, 0.3
 
+# A stage gains about a quarter to a half of what the one before gained, so all that follow gain no
+# more than this many times what it did, and a little.
+HOPE = 1.5
 # A share of the length that is worth a word.
 MUCH = 0.01
 
@@ -56,10 +61,12 @@ class Shortened(NamedTuple):
     """A path that was shortened.
 
     points : (k, 2), map units. remains : what finer points would gain, as a share of its length.
+    is_hopeless : was it left, because it cannot become shorter than its rival?
     """
 
     points: Array
     remains: float
+    is_hopeless: bool = False
 
     @property
     def is_settled(self) -> bool:
@@ -76,13 +83,21 @@ class Shortened(NamedTuple):
         )
 
 
-def shortened(problem: Problem, points: Array, must_stop: MustStop = never) -> Shortened:
+def shortened(
+    problem: Problem,
+    points: Array,
+    must_stop: MustStop = never,
+    stages: Sequence[tuple[float, float]] = STAGES,
+    rival: float = math.inf,
+) -> Shortened:
     """A shorter path near the one given, on any ground; where it must stop, as far as it is.
 
-    points : (m, 2), map units, through free space.
+    points : (m, 2), map units, through free space. stages : as of ``STAGES``; with fewer the path
+    is found sooner and longer. rival : the length of a path that this one competes with, map units;
+    a path that cannot become shorter than that is left.
     """
     ground, given, remains = _Ground.of(problem, points), points, math.inf
-    for spacing, least_gain in STAGES:
+    for spacing, least_gain in stages:
         finer = ground.subdivided(points, spacing)
         if len(finer) > MOST_POINTS:
             remains = math.inf
@@ -91,6 +106,8 @@ def shortened(problem: Problem, points: Array, must_stop: MustStop = never) -> S
             break
         stage = _Stage(ground, finer, spacing)
         points = stage.settled(least_gain, must_stop)
+        if stage.length * (1.0 - HOPE * stage.gain - MUCH) > rival:
+            return Shortened(given, math.inf, is_hopeless=True)
         # Halved spacings gain a quarter of what those before gained.
         remains = max(stage.gain / 3.0, ground.gain_by_bending(points))
     if is_passed_otherwise(ground.corners, given, points):
@@ -205,8 +222,8 @@ class _Stage:
 
     reaches : (m,), in features. around : the places around each point. ahead : the best of those,
     and what Newton's method proposes. beside : (m,), is a place of the point not free? changed,
-    before : (m,), which points have new places, in this round and the one before. gain : of the
-    whole stage, as a share of the length.
+    before : (m,), which points have new places, in this round and the one before. length : of the
+    path, map units. gain : of the whole stage, as a share of the length.
     """
 
     ground: _Ground
@@ -218,6 +235,7 @@ class _Stage:
     beside: npt.NDArray[np.bool_] = field(init=False)
     changed: Flags = field(init=False)
     before: Flags = field(init=False)
+    length: float = math.inf
     gain: float = 0.0
 
     def __post_init__(self) -> None:
@@ -229,15 +247,15 @@ class _Stage:
 
     def settled(self, least_gain: float, must_stop: MustStop) -> Array:
         """The points (m, 2) after rounds of moves."""
-        slow, first, length = 0, 0.0, math.inf
+        slow, first = 0, 0.0
         for _ in range(MOST_ROUNDS):
             shorter = self.improve()
             first = first or shorter
-            slow = slow + 1 if shorter > (1.0 - least_gain) * length else 0
-            length = shorter
+            slow = slow + 1 if shorter > (1.0 - least_gain) * self.length else 0
+            self.length = shorter
             if slow == PATIENCE or must_stop():
                 break
-        self.gain = 1.0 - length / first
+        self.gain = 1.0 - self.length / first
         return self.points
 
     def improve(self) -> float:
