@@ -137,6 +137,7 @@ class FirstPath(NamedTuple):
     path: Path | None  # None where nothing was found
     seconds: float = 0.0  # it took, without compiling
     stopped_by: str = ""  # what ended the whole run while it was looked for
+    branch: Path | None = None  # what the tree grows from; None where that is the path itself
 
 
 class Planner(Protocol):

@@ -66,15 +66,17 @@ def path_over_lattices(
         seconds += found.seconds
     paths = [path for path in (found.path, straight) if path is not None]
     ended = found.stopped_by if found.stopped_by in (INTERRUPT, "callback") else ""
-    if is_rough and paths and not is_over:
-        started = time.perf_counter()
-        paths = _shorter(problem, paths, seconds_left(options.time_limit, seconds))
-        seconds += time.perf_counter() - started
-    return FirstPath(min(paths, key=lambda path: path.length, default=None), seconds, ended)
+    best = min(paths, key=lambda path: path.length, default=None)
+    if not is_rough or best is None or is_over:
+        return FirstPath(best, seconds, ended)
+    started = time.perf_counter()
+    shorter = _shorter(problem, paths, seconds_left(options.time_limit, seconds))
+    # A path shortened like that has so many points that a tree would grow slowly from it.
+    return FirstPath(shorter, seconds + time.perf_counter() - started, ended, branch=best)
 
 
-def _shorter(problem: Problem, paths: list[Path], time_limit: float | None) -> list[Path]:
-    """Paths on rough ground that a tree hardly finds, within a time limit, seconds.
+def _shorter(problem: Problem, paths: list[Path], time_limit: float | None) -> Path:
+    """A path on rough ground that a tree hardly finds, within a time limit, seconds.
 
     There the shortest paths bend between the nodes of a lattice. A distance field allows for that,
     so its path may lead through another valley. All are moved sideways to where they are shorter.
@@ -83,9 +85,9 @@ def _shorter(problem: Problem, paths: list[Path], time_limit: float | None) -> l
 
     must_stop = never if time_limit is None else stop_after(time_limit)
     field = FastMarching().solve(problem, time_limit=time_limit)
-    found = paths if field.path is None else [*paths, field.path]
+    found = [*paths] if field.path is None else [*paths, field.path]
     for stages, count in ((COARSE, len(found)), (STAGES[2:3], 1)):
         found.sort(key=lambda path: path.length)
         moved = [shortened(problem, path.points, must_stop, stages) for path in found[:count]]
         found += [problem.path(path.points) for path in moved]
-    return found
+    return min(found, key=lambda path: path.length)

@@ -90,7 +90,7 @@ class GeodesicTraversal:
     directions : how many rays. sector : (first, last) angle, radians; by default 45 degrees to
     either side of the goal, [0, pi/2] in the paper. radius : rays that come within it are near
     the goal, map units; by default a 24th of the region's side, 0.5 in the paper. tolerance :
-    the largest error of the integrator in each step.
+    the largest error of the integrator in each step. time_limit : seconds.
 
     Where two neighbouring rays pass the goal on different sides, the geodesic between them that
     ends at the goal is solved for. Obstacles are not avoided: a geodesic that touches one is
@@ -102,14 +102,15 @@ class GeodesicTraversal:
     sector: tuple[float, float] | None = None
     radius: float | None = None
     tolerance: float = TOLERANCE
+    time_limit: float | None = None
 
     def __post_init__(self) -> None:
         require_count(directions=self.directions)
         if self.directions < 2:
             raise InputError(f"directions={self.directions} must be at least 2")
         require_positive(tolerance=self.tolerance)
-        if self.radius is not None:
-            require_positive(radius=self.radius)
+        optional = {"radius": self.radius, "time_limit": self.time_limit}
+        require_positive(**{name: value for name, value in optional.items() if value is not None})
         if self.sector is not None:
             first, last = as_point(self.sector, "sector")
             if first >= last:
@@ -155,7 +156,7 @@ class GeodesicTraversal:
         A callback that returns True, the time limit (seconds) and Ctrl-C leave the fan with
         what it has.
         """
-        stopper = Stopper(callback, least_limit(None, time_limit))
+        stopper = Stopper(callback, least_limit(self.time_limit, time_limit))
         misses: list[Miss] = []
         found: list[Geodesic] = []
         interrupted = False

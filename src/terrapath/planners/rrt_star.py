@@ -286,7 +286,8 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
         return answer
     settings = _kernel_options(problem, options)
     first = _first_path(problem, options, callback, settings.tolerance > 0.0)
-    branch = None if first.path is None else sampled(first.path.points, settings.step)
+    root = first.branch or first.path
+    branch = None if root is None else sampled(root.points, settings.step)
     tree = _allocate(options.samples, problem.surface, branch)
     _prepare(problem, tree, settings)
     search = _Search(problem, options, settings, tree, first)
