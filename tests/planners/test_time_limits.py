@@ -36,7 +36,7 @@ def test_every_planner_keeps_the_time_limit_of_a_call(name, problem):
     assert seen[0].samples < seen[0].total
 
 
-@pytest.mark.parametrize("name", [name for name in PLANNERS if name != "geodesic-traversal"])
+@pytest.mark.parametrize("name", PLANNERS)
 def test_of_two_time_limits_the_lower_counts(name, problem):
     seen = []
     planner = make_planner(name, time_limit=NOTHING, **SLOW.get(name, {}))
