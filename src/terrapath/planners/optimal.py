@@ -23,6 +23,7 @@ from ..surface.metric import is_rough
 from ..validation import require_count, require_positive
 from .base import (
     INTERRUPT,
+    REFINING,
     SEARCHING,
     TIME_LIMIT,
     Callback,
@@ -48,6 +49,9 @@ SLACK, MOST_NODES = 0.02, 1_000_000
 
 # A search that shortens the best route by no more than this share has found nothing.
 GAIN = 1e-6
+
+# On rough ground the best route is refined again, at most so many times.
+MOST_POLISHES = 4
 
 # The numbers of neighbours with which A* looks for routes.
 NEIGHBOURS = (32, 16, 8)
@@ -160,6 +164,7 @@ class _Run:
                 search()
                 if self.is_sure or self.must_stop():
                     break
+            self.polish()
         except KeyboardInterrupt:
             self.stopper.stopped_by = INTERRUPT
         self.tell_failures()
@@ -304,6 +309,19 @@ class _Run:
             self.failures.append(error)
         if path.length <= rival:
             self.keep(path)
+
+    def polish(self) -> None:
+        """Refine the best route again while it gains: on rough ground once is not all."""
+        if not is_rough(self.problem.surface, self.problem.bounds):
+            return
+        for _ in range(MOST_POLISHES):
+            before = self.best
+            if not self.found or self.stopper.stopped_by or self.stopper.is_late():
+                return
+            self.trying = REFINING
+            self.refine(min(self.found, key=lambda route: route.length))
+            if self.best >= before * (1.0 - GAIN):
+                return
 
     def refine_routes(self, direct: Path, count: int) -> None:
         """Refine the routes of the fields; each is kept as soon as it is done."""

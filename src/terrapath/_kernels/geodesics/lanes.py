@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
-from ..distance.ground import surface_piece
+from ..distance.surface_ray import surface_piece
 from ..space.free_space import segment_is_free
 from ..surface.speeds import speed_at
 from ..surface.surfaces import has_cells, stretch_at

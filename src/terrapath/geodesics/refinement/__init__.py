@@ -15,8 +15,7 @@ from ...surface import Surface
 from ...surface.metric import feature_size, is_rough
 from ...validation import Array, as_array, require_positive
 from ..cell_routes import polished
-from .curve import curve_through
-from .lanes import MUCH, along, shortened
+from .curve import along, curve_through
 from .newton import correct, lift, placed_parameters, shortest_polyline
 
 __all__ = ["refine", "shortest_polyline"]
@@ -38,6 +37,8 @@ ROUNDING = 1e-12
 # The energy of a polyline, taken as a length, is at most this many times its length where pieces
 # are short enough for a model of smooth ground. On the roughest ground they are not.
 SMOOTH = 1.1
+# After it was shortened, a path becomes shorter by less than this share.
+LITTLE = 0.01
 # Features this many times as long as wide are too many for a model that takes them as round.
 LONG = 4.0
 
@@ -117,11 +118,15 @@ def _pulled(
 
 
 def _shortened(problem: Problem, given: Path, must_stop: MustStop, rival: float) -> Path:
-    """The path shortened by true lengths, as far as any number of points can."""
-    made = shortened(problem, given.points, must_stop, rival=rival)
+    """The path shortened by true lengths; the same path from the goal to the start."""
+    from .lanes import shortened
+
+    order = -1 if problem.goal < problem.start else 1
+    made = shortened(problem, given.points[::order].copy(), must_stop, rival=rival)
     if not (made.is_settled or made.is_hopeless or must_stop()):
         tell(UnfinishedWarning(made.remark))
-    return min(given, problem.path(made.points), key=lambda path: path.length)
+    found = problem.path(made.points[::order].copy())
+    return min(given, found, key=lambda path: path.length)
 
 
 def _refined_on_rough_ground(
@@ -129,7 +134,7 @@ def _refined_on_rough_ground(
 ) -> Path:
     """The path shortened by true lengths, then pulled taut where the ground is smooth enough."""
     best = _shortened(problem, given, must_stop, rival)
-    is_worth_it = best.length * (1.0 - MUCH) <= rival
+    is_worth_it = best.length * (1.0 - LITTLE) <= rival
     if is_worth_it and _is_resolved(problem.surface, best):
         return _pulled(problem, best, tolerance, must_stop, is_near=True)[0]
     return best

@@ -70,3 +70,10 @@ def spline_through(points: Array, degree: int) -> Curve:
 def curve_through(points: Array) -> Curve:
     """The smooth curve through vertices (m, 2), with a parameter from 0 to 1."""
     return spline_through(points, 5 if len(points) > 6 else 3)
+
+
+def along(points: Array, pieces: int) -> Array:
+    """Points (pieces + 1, 2) at equal distances along a polyline on the plane."""
+    reached = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    places = np.linspace(0.0, reached[-1], pieces + 1)
+    return np.column_stack([np.interp(places, reached, axis) for axis in points.T])

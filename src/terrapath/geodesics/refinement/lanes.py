@@ -23,6 +23,7 @@ from ..._support.watching import MustStop, never
 from ...problem import Problem
 from ...surface.metric import feature_size
 from ...validation import Array
+from .curve import along
 from .walls import corners_near
 
 # The spacing of points, stage by stage, in features of the surface; and a stage is over where the
@@ -131,13 +132,6 @@ def is_passed_otherwise(places: Array, a: Array, b: Array) -> bool:
         if up[crossing][right].sum() != down[crossing][right].sum():
             return True
     return False
-
-
-def along(points: Array, pieces: int) -> Array:
-    """Points (pieces + 1, 2) at equal distances along a polyline on the plane."""
-    reached = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    places = np.linspace(0.0, reached[-1], pieces + 1)
-    return np.column_stack([np.interp(places, reached, axis) for axis in points.T])
 
 
 @dataclass(frozen=True)
