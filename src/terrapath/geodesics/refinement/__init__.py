@@ -14,7 +14,6 @@ from ...problem import Path, Problem
 from ...surface import Surface
 from ...surface.metric import feature_size, is_rough
 from ...validation import Array, as_array, require_positive
-from ..cell_routes import polished
 from .curve import along, curve_through
 from .newton import correct, lift, placed_parameters, shortest_polyline
 
@@ -80,6 +79,8 @@ def refine(
     given = problem.path(_checked(problem, path))
     is_hard = given.length > 0.0 and not must_stop() and _is_hard(problem)
     if problem.surface.cost_cells is not None:
+        from ..cell_routes import polished
+
         shorter = _shortened(problem, given, must_stop, rival) if is_hard else given
         return polished(problem, shorter, must_stop)
     if is_hard:
