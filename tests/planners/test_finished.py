@@ -61,7 +61,9 @@ def test_every_planner_ends_at_the_same_length(name, problem):
 def test_every_planner_says_what_is_proven_unreachable(name, enclosed):
     solution = tp.plan(enclosed, name, refine=True, bound=True)
     assert solution.status is tp.Status.UNREACHABLE
-    assert solution.stopped_by.startswith("start and goal lie in different parts of the free space: obstacles lie")
+    assert solution.stopped_by.startswith(
+        "start and goal lie in different parts of the free space: obstacles lie"
+    )
     assert solution.path is solution.lower_bound is solution.certificate is None
 
 

@@ -413,7 +413,9 @@ def test_every_planner_says_at_once_that_the_goal_is_unreachable(name, obstacles
     seen = []
     solution = tp.plan(problem, name, callback=seen.append, **OPTIONS.get(name, {}))
     assert solution.status is tp.Status.UNREACHABLE
-    assert solution.stopped_by.startswith("start and goal lie in different parts of the free space: ")
+    assert solution.stopped_by.startswith(
+        "start and goal lie in different parts of the free space: "
+    )
     assert solution.planner == name
     assert solution.path is solution.cost is solution.length is solution.gap is None
     assert solution.samples == 0
