@@ -89,3 +89,52 @@ def test_a_full_disk_loses_no_answer(tmp_path, capsys, monkeypatch):
     captured = capsys.readouterr()
     assert "true length" in captured.out
     assert "No space left" in captured.err
+
+
+@pytest.mark.parametrize("quiet", [[], ["--quiet"]])
+def test_output_that_was_closed_from_the_beginning_is_told(tmp_path, quiet):
+    program = (
+        "import os, sys; os.close(1); sys.stdout = None; from terrapath.cli import main; main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *ROUTE, *quiet, "--output", str(tmp_path / "route.csv")],
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 5
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert (tmp_path / "route.csv").exists()
+
+
+def test_an_absurdly_long_name_makes_no_long_line(capsys):
+    for arguments in (["--planner", "a" * 5000], ["--weight", f"{'b' * 5000}=2"]):
+        assert run(["plan", "one-peak", *arguments]) == 2
+        assert len(capsys.readouterr().err) < 1500
+    with pytest.raises(tp.InputError, match="5,000 letters"):
+        tp.Surface.from_grid([[[0.0] * 4] * 4], [0, 1, 2, 3], [0, 1, 2, 3], names=["c" * 5000])
+
+
+INTERRUPTED = """
+import builtins, sys
+original = builtins.__import__
+def interrupt(name, *rest):
+    if name.endswith({name!r}):
+        raise KeyboardInterrupt
+    return original(name, *rest)
+builtins.__import__ = interrupt
+sys.argv = ["terrapath", "plan", "one-peak"]
+from terrapath.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("name", ["typer", "console", "answers", "numpy"])
+def test_an_interrupt_during_imports_is_no_traceback(name):
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED.format(name=name)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (130, "")

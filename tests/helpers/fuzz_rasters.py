@@ -9,9 +9,11 @@ import time
 import warnings
 from pathlib import Path
 
+import laspy
 import numpy as np
 import rasterio
 import xarray
+from plyfile import PlyData, PlyElement
 from rasterio import Affine
 
 import terrapath as tp
@@ -62,6 +64,53 @@ def netcdf(path, **options):
     return path.read_bytes()
 
 
+def picture(path, **options):
+    with rasterio.open(path, "w", width=12, height=14, count=1, dtype="uint8", **options) as file:
+        file.write(np.clip(100.0 + HEIGHTS, 0, 255).astype(np.uint8)[None])
+    return path.read_bytes()
+
+
+def robot(path):
+    picture(path.with_suffix(".pgm"), driver="PNM")
+    path.write_text(
+        f"image: {path.stem}.pgm\nresolution: 0.05\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.9\nfree_thresh: 0.5\nmode: scale\n"
+    )
+    return path.read_bytes()
+
+
+def letters(path):
+    rows = "\n".join("".join(".@"[int(v > 4.0)] for v in row) for row in HEIGHTS)
+    path.write_text(f"type octile\nheight 14\nwidth 12\nmap\n{rows}\n")
+    return path.read_bytes()
+
+
+def points():
+    x, y = 50.0 * np.random.default_rng(1).uniform(size=(2, 400))
+    return np.column_stack([x, y, np.sin(x / 9.0) + 0.1 * y])
+
+
+def text_points(path):
+    np.savetxt(path, points(), delimiter=",", header="x,y,z", comments="", fmt="%.3f")
+    return path.read_bytes()
+
+
+def laser(path):
+    header = laspy.LasHeader(point_format=1, version="1.2")
+    header.scales = [1e-3] * 3
+    cloud = laspy.LasData(header)
+    cloud.x, cloud.y, cloud.z = points().T
+    cloud.write(path)
+    return path.read_bytes()
+
+
+def polygons(path, text):
+    kinds = [(name, "f4") for name in "xyz"]
+    vertices = np.array([tuple(point) for point in points()], dtype=kinds)
+    PlyData([PlyElement.describe(vertices, "vertex")], text=text).write(path)
+    return path.read_bytes()
+
+
 FILES = {
     "plain.tif": geotiff,
     "packed.tif": lambda path: geotiff(path, compress="deflate", predictor=3, nodata=-9.0),
@@ -71,6 +120,14 @@ FILES = {
     "classic.nc": lambda path: netcdf(path, format="NETCDF3_CLASSIC"),
     "four.nc": lambda path: netcdf(path, format="NETCDF4"),
     "erdas.img": lambda path: geotiff(path, driver="HFA"),
+    "map.yaml": robot,
+    "grid.map": letters,
+    "hills.png": lambda path: picture(path, driver="PNG"),
+    "cloud.csv": text_points,
+    "cloud.las": laser,
+    "cloud.laz": laser,
+    "cloud.ply": lambda path: polygons(path, text=False),
+    "text.ply": lambda path: polygons(path, text=True),
 }
 
 
@@ -115,6 +172,7 @@ def outcome(path):
 def main(seed, count):
     warnings.simplefilter("error")
     warnings.filterwarnings("ignore", "Use `@` matmul")
+    warnings.filterwarnings("ignore", "Dataset has no geotransform")  # while pictures are made
     warnings.simplefilter("ignore", tp.MapWarning)  # damaged heights are often absurd
     dice = random.Random(seed)
     found = {"count": 0, "wrong": [], "by_file": {}, "slowest": 0.0}
@@ -123,8 +181,8 @@ def main(seed, count):
         for name, make in FILES.items():
             path = Path(folder) / name
             content = make(path)
-            assert outcome(path) == "read", outcome(path)
-            seen = {"read": 0, "refused": 0}
+            assert outcome(path) == "read", (name, outcome(path))
+            seen, beside = {"read": 0, "refused": 0}, set(path.parent.iterdir())
             for number in range(count):
                 path.write_bytes(mutated(content, dice))
                 started = time.perf_counter()
@@ -132,6 +190,8 @@ def main(seed, count):
                 found["slowest"] = max(found["slowest"], time.perf_counter() - started)
                 found["count"] += 1
                 seen[result] = seen.get(result, 0) + 1
+                if left := set(path.parent.iterdir()) - beside:
+                    result = f"leaves {left}"
                 if result not in {"read", "refused"}:
                     found["wrong"].append(f"{name} {number}: {result}")
             found["by_file"][name] = (seen["read"], seen["refused"])

@@ -22,7 +22,7 @@ SHAPES = [
     shapely.LineString([(491_000, 5_501_000), (498_000, 5_519_000)]),
     shapely.Polygon([(5e5, 5.51e6), (5.01e5, 5.51e6), (5.005e5, 5.512e6)]),
 ]
-MUTATIONS = {"geojson": 900, "shp": 500, "gpkg": 400, "kml": 300}
+MUTATIONS = {"geojson": 900, "shp": 500, "gpkg": 400, "kml": 300, "gml": 300}
 LONGEST = 10.0  # seconds for one file, on a machine that has other things to do
 
 
@@ -32,7 +32,7 @@ def make(folder, ending):
     shapes = SHAPES[::2] if ending == "shp" else SHAPES
     crs = "EPSG:4326" if ending in {"geojson", "kml"} else "EPSG:3857"
     data = geopandas.GeoDataFrame({"a": range(len(shapes))}, geometry=shapes, crs="EPSG:32633")
-    data.to_crs(crs).to_file(path, driver="KML" if ending == "kml" else None)
+    data.to_crs(crs).to_file(path, driver={"kml": "KML", "gml": "GML"}.get(ending))
     return path
 
 
@@ -88,4 +88,11 @@ def test_altered_files_give_geometries_or_one_line(tmp_path, ending):
     assert refused > 0.03 * MUTATIONS[ending]
     assert read > 0.03 * MUTATIONS[ending]
     left = {path.suffix for path in Path(tmp_path).iterdir()}
-    assert left <= {f".{ending}", ".shx", ".dbf", ".prj", ".cpg"}
+    assert left <= {
+        f".{ending}",
+        ".shx",
+        ".dbf",
+        ".prj",
+        ".cpg",
+        *([".xsd"] if ending == "gml" else []),
+    }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import _thread
 import enum
+import errno
+import io
 import math
 import os
 import sys
@@ -35,10 +37,25 @@ class ExitCode(enum.IntEnum):
 # Lines
 
 
+LONGEST_WORD = 400  # letters; the middle of longer ones is left out, for nobody reads it
+
+
+class Closed(io.TextIOBase):
+    """Standard output that was closed from the beginning: what is written to it is an error."""
+
+    def write(self, text: str, /) -> int:
+        """Raise OSError."""
+        raise OSError(errno.EBADF, "it is closed")
+
+
 def remark(message: object) -> None:
     """Print one line on standard error, unless that is closed."""
+    words = (
+        word if len(word) <= LONGEST_WORD else f"{word[:60]}...{word[-60:]}"
+        for word in str(message).split()
+    )
     with suppress(OSError):
-        print("terrapath:", " ".join(str(message).split()), file=sys.stderr)
+        print("terrapath:", " ".join(words), file=sys.stderr)
 
 
 @contextmanager
@@ -53,6 +70,12 @@ def remarks() -> Iterator[None]:
 
     with told_to(show):
         yield
+
+
+def _is_of_reader(what: object) -> bool:
+    """Is it of a library that reads files, which may be damaged?"""
+    module = getattr(what, "__module__", None) or ""
+    return "rasterio" in str(what) or module.startswith("h5netcdf")
 
 
 @contextmanager
@@ -75,7 +98,7 @@ def without_broken_messages() -> Iterator[None]:
         if issubclass(what.exc_type, KeyboardInterrupt):
             # Ctrl-C while a callback of a library ran, which cannot raise it: raise it again.
             _thread.interrupt_main()
-        elif "rasterio" not in str(what.object):
+        elif not _is_of_reader(what.object):
             unraisable(what)
 
     sys.excepthook, sys.unraisablehook = of_uncaught, of_unraisable

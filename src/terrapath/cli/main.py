@@ -12,7 +12,7 @@ import typer
 
 from .. import __version__
 from ..errors import TerrapathError
-from .console import ExitCode, remark, remarks, settle, without_broken_messages
+from .console import Closed, ExitCode, remark, remarks, settle, without_broken_messages
 
 # Some versions of Typer bring their own copy of Click, and others use the installed one. So the
 # class is taken from Typer: it is the base of a usage error that Typer exports.
@@ -110,6 +110,8 @@ def main() -> None:
     # Imported objects stay until the end. Python's default garbage collection would examine them
     # often, and once more at the end. That takes a seventh of the time of a plan on a scene.
     gc.set_threshold(20_000, 20, 100)
+    if sys.stdout is None:
+        sys.stdout = Closed()
     code = run()
     settle(sys.__stdout__, sys.__stderr__)
     gc.freeze()

@@ -50,6 +50,10 @@ def open_netcdf(path: Path, files: ExitStack) -> Any:
     # It warns of attributes that contradict one another. Where this matters, values are missing.
     silence(xarray.SerializationWarning, "xarray.conventions")
     with reading(path):
+        if engine == "h5netcdf":
+            import h5py
+
+            h5py.File(path).close()  # h5netcdf prints a traceback of its own where this fails
         return files.enter_context(
             xarray.open_dataset(path, engine=engine, decode_times=False, cache=False)
         )

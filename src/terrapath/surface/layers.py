@@ -19,6 +19,9 @@ from .bounds import Bounds
 Kind = Literal["rise", "cost", "cells"]
 
 
+LONGEST_NAME = 200  # letters of a layer's name, which stands in tables, files and figures
+
+
 @dataclass(frozen=True)
 class Layer:
     """One scalar field over the plane.
@@ -63,6 +66,12 @@ def make_layers(
             raise InputError(f"{what} has {len(given)} entries for {count} layers; give one each")
     if len(set(names)) != count:
         raise InputError(f"names={list(names)} repeats a name; layers need distinct names")
+    for name in names:
+        if len(str(name)) > LONGEST_NAME:
+            raise InputError(
+                f"the layer's name {str(name)[:40]!r}... has {len(str(name)):,} letters; give it "
+                f"one of at most {LONGEST_NAME}"
+            )
     for name, weight, kind in zip(names, weights, kinds, strict=True):
         require_not_negative(**{f"the weight of {name}": weight})
         require_choice(get_args(Kind), **{f"the kind of {name}": kind})
