@@ -14,6 +14,7 @@ import certificate_oracles as oracles
 import terrapath as tp
 from certificate_cases import BOUNDS, SIDE, certified, random_surface, square
 from terrapath._kernels.certificates import norms as kernels, surface_models
+from terrapath._kernels.certificates.potentials import Potential
 from terrapath.certificates import claims
 from terrapath.certificates.claims import Core
 
@@ -29,7 +30,7 @@ def random_bound(random):
     cone = np.hypot(column * dx - 3.0, row[:, None] * dy + 2.0)
     rough = random.choice([0.01, 0.3, 3.0])
     coefficients = cone + rough * random.normal(size=(ny + 2, nx + 2))
-    return kernels.Potential(coefficients, 0.0, 0.0, dx, dy)
+    return Potential(coefficients, 0.0, 0.0, dx, dy)
 
 
 def random_box(random, bound, surface):
@@ -61,7 +62,7 @@ def points_of(box, count=9):
 
 def sampled_facts(surface, bound, box, goal):
     """The largest squared norm, the lowest u and the shortest chord in samples of a box."""
-    sheet, terrain, points = oracles.Sheet(*bound), oracles.Terrain(surface), points_of(box)
+    sheet, terrain, points = oracles.Sheet(*bound[:5]), oracles.Terrain(surface), points_of(box)
     norm = oracles.dual_norm_squared(sheet.gradient(points), terrain.gradients(points))
     chords = np.linalg.norm(terrain.lift(points) - goal, axis=1)
     return norm, sheet.at(points).min(), chords.min()
@@ -94,12 +95,12 @@ def test_the_facts_of_a_box_hold_on_needles(falloff):
     width = 1.0 / math.sqrt(2.0 * falloff)
     goal = oracles.Terrain(surface).lift(np.array([[5.2, 4.9]]))[0]
     for scale in (30.0, 3.0, 0.3, 0.03):
-        bound = kernels.Potential(4.0 + random.normal(size=(4, 4)), 4.0, 4.0, 2.0, 2.0)
+        bound = Potential(4.0 + random.normal(size=(4, 4)), 4.0, 4.0, 2.0, 2.0)
         place = 5.0 + width * random.uniform(-2.0, 2.0, 2)
         half = min(scale * width, 0.4)
         box = surface_models.Box(*np.clip(place, 4.4, 5.6), half, half)
         facts = facts_of(surface, bound, 0, 0, box, goal)
-        sheet, terrain = oracles.Sheet(*bound), oracles.Terrain(surface)
+        sheet, terrain = oracles.Sheet(*bound[:5]), oracles.Terrain(surface)
         points = points_of(box, 81)
         norm = oracles.dual_norm_squared(sheet.gradient(points), terrain.gradients(points))
         assert facts.norm >= norm.max() * (1.0 - 1e-9)
@@ -178,7 +179,7 @@ def test_the_facts_of_a_box_close_in_at_second_order(on_spline):
                 surface.data, bound, kernels.Anchor(goal, 1.0, math.inf), 0.9, 2, 2, box
             )
             sheet, terrain, points = (
-                oracles.Sheet(*bound),
+                oracles.Sheet(*bound[:5]),
                 oracles.Terrain(surface),
                 points_of(box),
             )
@@ -283,7 +284,7 @@ def test_what_overflows_proves_nothing():
     assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 3.0, 0.0), 3.0).proven == 0.0
     assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 2.0, 1.0), 3.0).proven == 1.0
     surface = tp.Surface.from_peaks([[(1e-145, 1e307, 0.5, 0.5)]]).data
-    bound = kernels.Potential(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0)
+    bound = Potential(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0)
     box = surface_models.Box(0.5, 0.5, 0.5, 0.5)
     anchor = kernels.Anchor(np.ones(3), 1.0, math.inf)
     assert kernels.margin_of_box(surface, bound, anchor, 1.0, 0, 0, box) == -math.inf

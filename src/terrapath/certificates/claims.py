@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.certificates import norms as kernels
-from .._kernels.surface.cells import range_in_box
+from .._kernels.certificates.potentials import Potential, linear_value
 from .._kernels.surface.points import fill_values
 from .._kernels.surface.surfaces import Peaks, Spline
 from .._support.watching import MustStop, never
@@ -61,7 +61,9 @@ class Claim:
 
     value : the bound, map units. norm : M, the largest dual norm of du on all cells that matter.
     coefficients : (ny + 2, nx + 2), of the bicubic B-spline u on the cells of a lattice over
-    ``bounds``. horizon : W; a cell matters where the goal may be nearer than (W - u) / M.
+    ``bounds``. Where costs are constant in cells, u is linear over triangles, and these are its
+    values at the nodes, the outermost of them unused.
+    horizon : W; a cell matters where the goal may be nearer than (W - u) / M.
     start_core, goal_core : the cells around the ends, where the chord replaces u.
     bounds : the rectangle of the lattice, map units. A path that leaves it is already long enough
     on the plane.
@@ -103,7 +105,8 @@ def require_sound(claim: Claim) -> None:
 
 def _require_fit(problem: Problem, claim: Claim) -> None:
     """Raise CertificateError where the claim does not fit the problem."""
-    if not problem.bounds.encloses(claim.bounds):
+    # Cells of constant cost may reach beyond the bounds, where no path can go.
+    if problem.surface.cost_cells is None and not problem.bounds.encloses(claim.bounds):
         raise CertificateError(
             f"the certificate covers {claim.bounds}, which is not within {problem.bounds}"
         )
@@ -165,11 +168,12 @@ def _doubt(surface: Peaks | Spline) -> float:
     return EPSILONS * float(np.finfo(np.float64).eps) * math.hypot(*(sizes * surface.weights))
 
 
-def _potential(problem: Problem, claim: Claim) -> kernels.Potential:
+def _potential(problem: Problem, claim: Claim) -> Potential:
     """The function u, with the start as the origin."""
     (x, y), lattice = problem.start, claim.lattice
     corner_x, corner_y = lattice.bounds.x1_min - x, lattice.bounds.x2_min - y
-    return kernels.Potential(claim.coefficients, corner_x, corner_y, lattice.dx, lattice.dy)
+    is_linear, steps = problem.surface.cost_cells is not None, (lattice.dx, lattice.dy)
+    return Potential(claim.coefficients, corner_x, corner_y, *steps, is_linear)
 
 
 def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
@@ -185,8 +189,13 @@ def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
 
 
 def exempt_cells(problem: Problem, claim: Claim) -> Cells:
-    """Cells (ny, nx) that no path meets between its start core and its goal core."""
+    """Cells (ny, nx) that no path meets between its start core and its goal core.
+
+    A piecewise linear u holds in the cores, too.
+    """
     exempt = problem.free_space.covered_cells(claim.lattice)
+    if problem.surface.cost_cells is not None:
+        return exempt
     for core in (claim.start_core, claim.goal_core):
         exempt[core.row0 : core.row1, core.column0 : core.column1] = True
     return exempt
@@ -259,8 +268,7 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
 
     The ground is the core, widened by half its size on all sides. Let c be the cost at the end and
     G the steepest slope of the cost there. A path of length s, without costs, has met no cost below
-    c - G s. So at a distance of d it is at least (c - G d / 2) d long. Where costs are constant in
-    cells, all that is multiplied by the least of the cells around.
+    c - G s. So at a distance of d it is at least (c - G d / 2) d long.
     """
     surface, data = problem.surface, problem.surface.data
     if not (surface.costs and isinstance(data, Spline)):
@@ -277,12 +285,10 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
         (around.x2_max - y, around.x2_max < bounds.x2_max),
     )
     far = min((distance for distance, is_inside in sides if is_inside), default=math.inf)
-    found, cost = span_within(data, around), math.exp(float(surface.log_cost_jets((x, y))[0]))
+    found, cost = span_within(data, around), float(surface.cost((x, y)))
     farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
-    least = range_in_box(data.cells, x0 - width, x1 + width, y0 - height, y1 + height).low
-    least *= 1.0 - ROUNDING
-    floor = least * max(found.least, cost - 0.5 * found.steepest * farthest)
-    return kernels.Anchor(end.lifted, floor, least * found.least * float(far))
+    floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
+    return kernels.Anchor(end.lifted, floor, found.least * (1.0 - ROUNDING) * float(far))
 
 
 def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> float:
@@ -310,19 +316,26 @@ def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
 
     Let a path leave the start core for the last time at p, and after that enter the goal core for
     the first time at q. Its length is at least distance(start, p) + (u(q) - u(p)) / M +
-    distance(q, goal); or else it meets a cell that is at least (W - u(p)) / M from the goal.
+    distance(q, goal); or else it meets a cell that is at least (W - u(p)) / M from the goal. A
+    piecewise linear u needs no cores: p is the start and q the goal.
     """
     surface, start, goal = _ground(problem)
     doubt = _doubt(surface)
     least = problem.surface.least_cost
     straight = max(least * (math.dist(start, goal) * (1.0 - ROUNDING) - doubt), 0.0)
-    if _overlap(claim.start_core, claim.goal_core):
+    is_linear = problem.surface.cost_cells is not None
+    if not is_linear and _overlap(claim.start_core, claim.goal_core):
         return straight
     detour = least * least_detour(problem, claim.bounds) * (1.0 - ROUNDING)
     begin = End(claim.start_core, problem.start, start, doubt)
     end = End(claim.goal_core, problem.goal, goal, doubt)
-    first = edge_margin(problem, claim, begin, -1.0 / norm)
-    last = edge_margin(problem, claim, end, 1.0 / norm)
+    if is_linear:
+        u = _potential(problem, claim)
+        first = -float(linear_value(u, *start[:2])) / norm
+        last = float(linear_value(u, *goal[:2])) / norm
+    else:
+        first = edge_margin(problem, claim, begin, -1.0 / norm)
+        last = edge_margin(problem, claim, end, 1.0 / norm)
     rest = min(last, claim.horizon / norm - least * doubt)
     within = first + rest - ROUNDING * (abs(first) + abs(rest))
     # ``within`` is NaN where something overflowed; then the comparison is False.
@@ -338,11 +351,11 @@ def least_detour(problem: Problem, window: Bounds) -> float:
     (x0, y0), (x1, y1) = problem.start, problem.goal
     outer, found = problem.bounds, math.inf
     # Differences first: far from the map's origin the sum of two places loses digits.
-    for side, edge in ((window.x1_min, outer.x1_min), (window.x1_max, outer.x1_max)):
-        if side != edge:
+    for side in (window.x1_min, window.x1_max):
+        if outer.x1_min < side < outer.x1_max:
             found = min(found, math.hypot((x0 - side) + (x1 - side), y1 - y0))
-    for side, edge in ((window.x2_min, outer.x2_min), (window.x2_max, outer.x2_max)):
-        if side != edge:
+    for side in (window.x2_min, window.x2_max):
+        if outer.x2_min < side < outer.x2_max:
             found = min(found, math.hypot(x1 - x0, (y0 - side) + (y1 - side)))
     return found
 

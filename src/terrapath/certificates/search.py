@@ -26,6 +26,7 @@ from ..surface.bounds import Bounds
 from ..validation import Array, require_positive
 from .certificate import Certificate, certify
 from .claims import Claim, Core, Needs, cell_needs
+from .flow import cell_certificates
 
 T = TypeVar("T", np.float64, np.bool_)
 
@@ -209,6 +210,9 @@ def certificates(
     gap, or when a repair gains little. Where it must stop, one last certificate comes at once.
     """
     window = search_window(problem, length)
+    if problem.surface.cost_cells is not None:
+        yield from cell_certificates(problem, window, length, target_gap, must_stop)
+        return
     cap = length * (1.0 + 1e-6)
     for side in SIDES:
         spacing = max(window.width, window.height) / side

@@ -35,6 +35,11 @@ POINTS_PER_SIDE, MANY_POINTS, MOST_POINTS = 3, 1_000_000, 6_000_000
 
 # The distances of the points near a path, as shares of a side, in one search after the other.
 SHARES = (0.25, 0.1, 0.04, 0.015, 0.006)
+# Searches reach so many cells to either side: the first ones, and the others. One follows another
+# of the same distances while the path gets shorter by more than this share, and at most so often.
+REACHES, GAIN, MOST_SEARCHES = (3, 1), 1e-6, 50
+# All that is repeated, too, because a path without its needless bends can move as a whole.
+MOST_CYCLES = 10
 # So many points lie on either side of a bend.
 BESIDE = 2
 
@@ -213,18 +218,34 @@ def polished(problem: Problem, path: Path, must_stop: MustStop = never) -> Path:
     """
     grid = grid_of(problem)
     assert grid is not None
+    for _ in range(MOST_CYCLES):
+        better = _polished_once(problem, grid, path, must_stop)
+        is_at_rest = better.length >= path.length * (1.0 - GAIN)
+        path = better
+        if is_at_rest or must_stop():
+            break
+    return path
+
+
+def _polished_once(problem: Problem, grid: CellGrid, path: Path, must_stop: MustStop) -> Path:
+    """A path after searches near it, Newton's method, and without bends that do nothing."""
     best = path
     for share in SHARES:
-        if must_stop():
-            return best
-        points = _crossings(grid, best.points)
-        sides = _sides_with(problem, grid, _points_near(grid, points, share))
-        found = _search(problem, sides, must_stop)
-        best = _shorter(problem, best, found)
+        reach = REACHES[0] if share == SHARES[0] else REACHES[1]
+        for _ in range(MOST_SEARCHES):
+            if must_stop():
+                return best
+            points, before = _crossings(grid, best.points), best.length
+            sides = _sides_with(problem, grid, _points_near(grid, points, share, reach))
+            best = _shorter(problem, best, _search(problem, sides, must_stop))
+            if best.length >= before * (1.0 - GAIN):
+                break
     if must_stop():
         return best
     best = _shorter(problem, best, _without_bends(problem, best.points))
-    best = _shorter(problem, best, obeying_snell(problem.surface, grid.x, grid.y, best.points))
+    for first in range(2):
+        bent = obeying_snell(problem.surface, grid.x, grid.y, best.points, first)
+        best = _shorter(problem, best, bent)
     return _shorter(problem, best, _without_bends(problem, best.points))
 
 
@@ -252,10 +273,10 @@ def _crossings(grid: CellGrid, points: Array) -> Array:
     return np.concatenate(pieces)
 
 
-def _points_near(grid: CellGrid, points: Array, share: float) -> Array:
+def _points_near(grid: CellGrid, points: Array, share: float, reach: int) -> Array:
     """Points on sides near a path (m, 2) and the path's own; they lie close around its bends.
 
-    share : their distance, as a share of a side.
+    share : their distance, as a share of a side. reach : in cells to either side of the path.
     """
     steps = share * grid.sides
     offsets = np.arange(-BESIDE, BESIDE + 1.0)
@@ -274,21 +295,21 @@ def _points_near(grid: CellGrid, points: Array, share: float) -> Array:
     inner = points[~(are_on[0] | are_on[1])]
     around = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2) * steps
     found.append((inner[:, None] + around).reshape(-1, 2))
-    found.append(_corners_and_middles(grid, points))
+    found.append(_corners_and_middles(grid, points, reach))
     return np.clip(np.concatenate(found), (grid.x[0], grid.y[0]), (grid.x[-1], grid.y[-1]))
 
 
-def _corners_and_middles(grid: CellGrid, points: Array) -> Array:
+def _corners_and_middles(grid: CellGrid, points: Array, reach: int) -> Array:
     """The corners, and the middles of sides, of the cells near a path's points (m, 2)."""
     rows, columns = grid.costs.shape
     cells = _touched(grid, points)
     cells = np.unique(cells[cells >= 0])
     j, i = np.divmod(cells, columns)
-    near = np.zeros((rows + 2, columns + 2), bool)
-    for down in range(3):
-        for east in range(3):
+    near = np.zeros((rows + 2 * reach, columns + 2 * reach), bool)
+    for down in range(2 * reach + 1):
+        for east in range(2 * reach + 1):
             near[j + down, i + east] = True
-    j, i = np.nonzero(near[1:-1, 1:-1])
+    j, i = np.nonzero(near[reach : reach + rows, reach : reach + columns])
     x = np.stack([grid.x[i], 0.5 * (grid.x[i] + grid.x[i + 1]), grid.x[i + 1]], axis=1)
     y = np.stack([grid.y[j], 0.5 * (grid.y[j] + grid.y[j + 1]), grid.y[j + 1]], axis=1)
     places = [

@@ -13,8 +13,10 @@ from ..surface import Surface
 from ..surface.metric import segment_lengths
 from ..validation import Array
 
-# Differences are taken over this share of a side, and no bend comes nearer to a side's end.
+# Differences are taken over this share of a side.
 STEP = 1e-4
+# A bend moves by no more than so many sides.
+FARTHEST = 3.0
 # Steps of Newton's method, and how often one is halved.
 MOST_STEPS, MOST_HALVINGS = 20, 8
 # It ends where a step shortens the path by no more than this share.
@@ -23,13 +25,14 @@ GAIN = 1e-14
 ON_SIDE = 1e-9
 
 
-def obeying_snell(surface: Surface, x: Array, y: Array, points: Array) -> Array:
+def obeying_snell(surface: Surface, x: Array, y: Array, points: Array, first: int = 0) -> Array:
     """A path (m, 2) whose bends have moved along the sides of cells to where it is shortest.
 
-    x (nx + 1,), y (ny + 1,) : where the sides are. Bends that are at corners, or not on a side,
-    stay where they are; no bend leaves its side.
+    x (nx + 1,), y (ny + 1,) : where the sides are. Bends that are not on a side stay where they
+    are. A bend may move on to the next sides of its line. first : the axis, 0 or 1, that bends at
+    corners may move along.
     """
-    along, low, high = _rooms(x, y, points)
+    along, low, high = _rooms(x, y, points, first)
     if not (low < high).any():
         return points
     length = _length(surface, points)
@@ -55,7 +58,7 @@ def _length(surface: Surface, points: Array) -> float:
     return float(segment_lengths(surface, points[:-1], points[1:]).sum())
 
 
-def _rooms(x: Array, y: Array, points: Array) -> tuple[Array, Array, Array]:
+def _rooms(x: Array, y: Array, points: Array, first: int) -> tuple[Array, Array, Array]:
     """For each point, the vector of its side (m, 2), and how far it may move, (m,) down and up.
 
     These are shares of the side; a point that may not move has the vector 0.
@@ -66,10 +69,14 @@ def _rooms(x: Array, y: Array, points: Array) -> tuple[Array, Array, Array]:
         (0, x, column, share_x, share_y),
         (1, y, row, share_y, share_x),
     ):
-        moves = (share > 2.0 * STEP) & (share < 1.0 - 2.0 * STEP) & _is_on_side(across)
+        moves = _is_on_side(across)
+        if axis != first:
+            moves &= ~_is_on_side(share)
         moves[[0, -1]] = False
         along[moves, axis] = np.diff(places)[k[moves]]
-        low[moves], high[moves] = 2.0 * STEP - share[moves], 1.0 - 2.0 * STEP - share[moves]
+        reached = k[moves] + share[moves]
+        low[moves] = np.maximum(-FARTHEST, -reached)
+        high[moves] = np.minimum(FARTHEST, len(places) - 1 - reached)
     return along, low, high
 
 

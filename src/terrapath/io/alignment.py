@@ -11,6 +11,7 @@ from pyproj import CRS
 
 from .._support.memory import blocks
 from ..errors import MapError
+from ..surface.costs import CellLayers
 from ..surface.raster import Grid
 from ..surface.resampling import require_overlap, resample
 from ..validation import Array
@@ -57,6 +58,8 @@ def read_all(
     for part, view, out in zip(parts, views, bands, strict=True):
         if part.kind == "cost":
             _costs_onto(part.name, view, target, out)
+        elif part.kind == "cells":
+            _cells_onto(part.name, view, target, out)
         elif not view.read_as(target, out):
             resample(_read(view), view.grid, target, out, linear=False)
     return bands
@@ -85,6 +88,47 @@ def _costs_onto(name: str, view: View, target: Grid, out: Array) -> None:
     np.log(values, out=values)
     resample(values, view.grid, target, out, linear=True)
     np.exp(out, out=out)
+
+
+def _cells_onto(name: str, view: View, target: Grid, out: Array) -> None:
+    """Bring the costs of cells to the target's cells: each has the cost where its centre lies."""
+    values = _read(view)
+    _require_costs(name, values, view.grid)
+    if not view.read_as(target, out):
+        resample(values, view.grid, target, out, nearest=True)
+
+
+def own_cells(
+    parts: Sequence[Part],
+    base: View,
+    target: Grid,
+    most_cells: int,
+    without_fills: Callable[[View], View],
+) -> CellLayers | None:
+    """The costs of the cells of a raster whose cells are not those of the heights.
+
+    None where they are; where there are several such rasters with different cells, or where
+    these are not upright on the map's plane. Then the cells are those of the heights.
+    """
+    cells = [part for part in parts if part.kind == "cells"]
+    if not cells or base.factor > 1 or base.grid.needs_warp:
+        return None
+    grid = cells[0].band.grid
+    if grid.needs_warp or grid.crs != target.crs or _has_cells_of(grid, base.band.grid):
+        return None
+    if not all(part.band.grid.is_same(grid) for part in cells[1:]):
+        return None
+    views = [View.whole(part.band).around(*target.outline(None)) for part in cells]
+    found = [without_fills(view) for view in views if view is not None]
+    values = []
+    for view in found:
+        view.require_size(most_cells)
+        given = _read(view)
+        # Where a cell has no cost, the cells of the heights there are blocked.
+        given[~np.isfinite(given)] = np.nanmax(given)
+        values.append(given if view.grid.transform.e > 0.0 else given[::-1])
+    t = found[0].grid.southward().transform
+    return CellLayers(np.ascontiguousarray(values), t.c, t.f, t.a, t.e)
 
 
 def _read(view: View) -> Array:

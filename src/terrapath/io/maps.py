@@ -15,6 +15,7 @@ from pyproj import CRS
 from ..errors import InputError, MapError, MapWarning, tell
 from ..surface import Surface
 from ..surface.bounds import as_bounds
+from ..surface.costs import CellLayers, with_cells
 from ..surface.georeference import Georeference, metres_of
 from ..surface.raster import Grid, Raster
 from ..validation import Array, require_count, require_not_negative
@@ -46,6 +47,7 @@ class OpenMap:
     smoothing: float | str | None
     unsaid: Unsaid
     files: ExitStack
+    smooth_costs: bool = False
     is_closed: bool = False
 
     @cached_property
@@ -91,6 +93,7 @@ class OpenMap:
             base = self._without_fills(base, heights=True)
             target = base.grid.southward() if base.grid.is_upright else base.grid
             bands = self._read(base, target, most_cells)
+            cells = self._own_cells(base, target, most_cells)
             factor, unit = self._into_plane_unit(bands[0], target)
             scale = _scale(self.smoothing, base, math.sqrt(math.prod(base.grid.sides)), factor)
             surface = Raster.on(target, bands).to_surface(
@@ -101,6 +104,8 @@ class OpenMap:
                 fill_holes=float(self.fill_holes),
                 smoothing=scale,
             )
+        if cells is not None:
+            surface = with_cells(surface, cells)
         return replace(surface, source=self.heights.band.label)
 
     def _view(self, within: Rectangle | None, margin: float = 0.0, decimate: int = 1) -> View:
@@ -116,7 +121,7 @@ class OpenMap:
         """All layers, opened when first needed; each has a CRS, or the cells of the heights."""
         given: list[tuple[Kind, str, LayerSource | Source]] = [
             *(("rise", *item) for item in self.layers.items()),
-            *(("cost", *item) for item in self.costs.items()),
+            *(("cost" if self.smooth_costs else "cells", *item) for item in self.costs.items()),
         ]
         parts = [self.heights]
         for kind, name, source in given:
@@ -144,6 +149,14 @@ class OpenMap:
 
         return read_all(self._parts, base, target, most_cells, self._without_fills)
 
+    def _own_cells(self, base: View, target: Grid, most_cells: int) -> CellLayers | None:
+        """The costs of cells that are not those of the heights."""
+        if not self.costs or self.smooth_costs:
+            return None
+        from .alignment import own_cells
+
+        return own_cells(self._parts, base, target, most_cells, self._without_fills)
+
     def _into_plane_unit(self, heights: Array, target: Grid) -> tuple[float, str]:
         """Convert heights to the plane's unit, in place; returns the factor and the new unit."""
         band = self.heights.band
@@ -166,6 +179,7 @@ def open_map(
     height_band: int | str = 1,
     layers: Sources | None = None,
     costs: Sources | None = None,
+    smooth_costs: bool = False,
     fill_holes: float = 0.0,
     smoothing: float | str | None = "auto",
     crs: CRS | str | int | None = None,
@@ -191,7 +205,8 @@ def open_map(
         with gdal():
             band = LayerSource.of_heights(source, height_band).open(files, unsaid)
         heights = Part("height", "rise", 1.0, band)
-        opened = OpenMap(heights, layers or {}, costs or {}, fill_holes, smoothing, unsaid, files)
+        given = (layers or {}, costs or {}, fill_holes, smoothing, unsaid, files, smooth_costs)
+        opened = OpenMap(heights, *given)
         yield opened
     finally:
         if opened is not None:
@@ -267,6 +282,7 @@ def read_surface(
     height_band: int | str = 1,
     layers: Sources | None = None,
     costs: Sources | None = None,
+    smooth_costs: bool = False,
     fill_holes: float = 0.0,
     smoothing: float | str | None = "auto",
     crs: CRS | str | int | None = None,
@@ -284,9 +300,13 @@ def read_surface(
 
     source : anything GDAL reads, an xarray DataArray or Dataset, or (values, x, y).
     height_band : its band of heights, 1-based, or the name of a variable.
-    layers, costs : name -> LayerSource, path, array or text ``FILE[:BAND][*WEIGHT]``; resampled to
-    the grid of the heights. A change of one of ``layers`` costs. The value of one of ``costs``
-    multiplies lengths, and must be above 0.
+    layers, costs : name -> LayerSource, path, array or text ``FILE[:BAND][*WEIGHT]``. A change of
+    one of ``layers`` costs; they are resampled to the grid of the heights. The value of one of
+    ``costs`` multiplies lengths, and must be above 0. It is what the raster says in each of its
+    cells. Where a cost raster is not upright on the plane, as one in degrees, or several have
+    different cells, the cells are those of the heights, with the value at their centres.
+    smooth_costs : take costs as samples of smooth fields instead; between samples they are
+    interpolated in their logarithms.
     fill_holes : holes up to this side are filled, map units of the plane; all other cells
     without data in any layer are blocked.
     smoothing : standard deviation, map units. "auto": where heights are rounded to a step, the
@@ -312,6 +332,7 @@ def read_surface(
         height_band=height_band,
         layers=layers,
         costs=costs,
+        smooth_costs=smooth_costs,
         fill_holes=fill_holes,
         smoothing=smoothing,
         crs=crs,

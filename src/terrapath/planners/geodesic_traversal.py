@@ -144,6 +144,16 @@ class GeodesicTraversal:
             tolerance=self.tolerance,
         )
 
+    def _require_smooth(self, problem: Problem) -> None:
+        """Raise InputError where costs leap from cell to cell: no geodesic crosses a leap."""
+        cells = [layer.name for layer in problem.surface.costs if layer.kind == "cells"]
+        if cells:
+            raise InputError(
+                f"planner={self.name} follows rays over smooth ground, and the cost "
+                f"{', '.join(cells)} is constant in cells; read it with smooth_costs "
+                "(--smooth-costs), or choose optimal"
+            )
+
     def fan(
         self,
         problem: Problem,
@@ -154,8 +164,9 @@ class GeodesicTraversal:
         """Trace all rays, and find the geodesic between two of them as soon as both are there.
 
         A callback that returns True, the time limit (seconds) and Ctrl-C leave the fan with
-        what it has.
+        what it has. Raises InputError where costs are constant in cells.
         """
+        self._require_smooth(problem)
         stopper = Stopper(callback, least_limit(self.time_limit, time_limit))
         misses: list[Miss] = []
         found: list[Geodesic] = []

@@ -202,6 +202,8 @@ class Problem:
         """The default spacing of lattice nodes along x1 and x2, map units."""
         finest = [metric.feature_size(self.surface)]
         finest += [Spacing(cells.dx, cells.dy) for cells in self.mask_cells]
+        if (costs := self.surface.cost_cells) is not None:
+            finest.append(Spacing(costs.dx, costs.dy))
         return default_spacing(self.bounds, Spacing(*map(min, zip(*finest, strict=True))))
 
     @property
@@ -219,6 +221,9 @@ class Problem:
         grids = list(self.mask_cells)
         if self.surface.cells is not None:
             grids.append(self.surface.cells)
+        if (costs := self.surface.cost_cells) is not None:
+            centre = costs.x0 + 0.5 * costs.dx, costs.y0 + 0.5 * costs.dy
+            grids.append(Cells(*centre, costs.dx, costs.dy))
         return min(grids, key=lambda cells: min(cells.dx, cells.dy), default=None)
 
     @cached_property

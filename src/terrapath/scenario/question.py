@@ -64,6 +64,7 @@ def open_question(scenario: Scenario) -> Iterator[Question]:
         height_band=1 if place.height_band is None else place.height_band,
         layers=_sources(place.layers),
         costs=_sources(place.costs),
+        smooth_costs=place.smooth_costs,
         fill_holes=place.fill_holes,
         smoothing=None if place.smooth == "none" else place.smooth,
         crs=place.crs,

@@ -153,6 +153,14 @@ class MapSection:
             flags=("--cost",),
         ),
     ] = field(default_factory=dict)
+    smooth_costs: Annotated[
+        bool,
+        a_switch(
+            "Interpolate costs between the centres of their cells; otherwise each cell costs what "
+            "its raster says.",
+            "--smooth-costs/--cost-cells",
+        ),
+    ] = False
     weights: Annotated[
         Weights,
         Option(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,10 @@ from .._kernels.surface.surfaces import Peaks, Spline
 from ..validation import Array
 from .bounds import uniform_spacing
 from .fitting import fit_grid
-from .layers import Layer, limited, require_costs, weights_of
+from .layers import Layer, limited, require_costs, weights_of, with_costs
+
+if TYPE_CHECKING:
+    from .surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +115,13 @@ def cost_values_at(
     if cells is not None and isinstance(data, Spline):
         values[:, are_cells] = cells.at(points, data.cells.costs)
     return values
+
+
+def with_cells(surface: Surface, cells: CellLayers) -> Surface:
+    """A surface with other values for its cost layers that are constant in cells."""
+    assert isinstance(surface.data, Spline)
+    data = with_costs(surface.data, surface.cost_data, cost_cells(cells, surface.costs))
+    return replace(surface, data=data, cost_cells=cells)
 
 
 def _equal_steps(places: Array) -> Array:

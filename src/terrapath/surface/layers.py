@@ -214,11 +214,9 @@ class Span(NamedTuple):
 
 def span_within(data: Spline, bounds: Bounds) -> Span:
     """Limits of the cost and the layers inside a rectangle, from the spline's coefficients."""
-    _, ny, nx = data.coefficients.shape
-    rows = cells_within(bounds.x2_min, bounds.x2_max, data.y0, data.dy, ny)
-    columns = cells_within(bounds.x1_min, bounds.x1_max, data.x0, data.dx, nx)
-    layers = data.coefficients[:, rows, columns]
-    logs = data.log_cost[0, rows, columns] if len(data.log_cost) else np.zeros((2, 2))
+    rows = cells_within(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.log_cost.shape[1])
+    columns = cells_within(bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.log_cost.shape[2])
+    logs, layers = data.log_cost[0, rows, columns], data.coefficients[:, rows, columns]
     slope = math.hypot(
         float(np.abs(np.diff(logs, axis=1)).max()) / data.dx,
         float(np.abs(np.diff(logs, axis=0)).max()) / data.dy,

@@ -316,7 +316,8 @@ class Raster:
     def _fill(self, size: float, kinds: Sequence[Kind]) -> Cells | None:
         """Fill small holes, and continue the ground into large ones; returns the blocked cells.
 
-        Costs are filled in their logarithms. They stay within their range, and so above 0.
+        Costs are filled in their logarithms. They stay within their range, and so above 0. Other
+        cells keep their values.
         """
         from .holes import continue_into_holes, fill_small_holes, missing_cells
 
@@ -327,15 +328,18 @@ class Raster:
             missing = missing_cells(band)
             if not missing.any():
                 continue
-            if kind == "cost":
+            known = band[~missing] if kind == "cells" else None
+            if kind != "rise":
                 np.log(band, out=band)
             low, high = np.nanmin(band), np.nanmax(band)
             if size > 0.0:
                 fill_small_holes(band, missing, *self.grid.sides, size)
                 np.clip(band, low, high, out=band)
             continue_into_holes(band, missing)
-            if kind == "cost":
+            if kind != "rise":
                 np.exp(np.clip(band, low, high, out=band), out=band)
+            if known is not None:
+                band[~missing] = known
             blocked |= missing
         return blocked if blocked.any() else None
 

@@ -37,10 +37,19 @@ def _spline_at(spline: Spline, column: Array, row: Array, shape: tuple[int, int]
     return inside[:, 0]
 
 
-def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: bool) -> None:
+def resample(
+    values: Array,
+    source: Grid,
+    target: Grid,
+    out: Array,
+    *,
+    linear: bool = False,
+    nearest: bool = False,
+) -> None:
     """Resample values (rows, columns) of one grid to another, into ``out``; NaN is no-data.
 
-    By a bicubic spline or, if ``linear``, bilinearly, so that the range of the values is kept.
+    By a bicubic spline; or, if ``linear``, bilinearly, so that the range of the values is kept; or,
+    if ``nearest``, by the value of the cell that the centre lies in.
     Each target cell takes the value at its centre; it is no-data where the centre lies in a cell
     without data, or outside. ``values`` is changed: cells without data are given values.
     """
@@ -50,7 +59,7 @@ def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: b
         return
     continue_into_holes(values, missing)
     linear = linear or min(values.shape) < LEAST_FOR_SPLINE
-    spline = None if linear else _spline_through(values)
+    spline = None if linear or nearest else _spline_through(values)
     last = np.array(values.shape) - 1
     places = Places(source, target)
     for rows in blocks(target.rows, target.columns):
@@ -60,14 +69,16 @@ def resample(values: Array, source: Grid, target: Grid, out: Array, *, linear: b
                 np.abs(row - 0.5 * last[0]) <= 0.5 * last[0] + 0.5 + SAME_PLACE
             )
         column, row = column[inside], row[inside]
-        nearest = [
+        cell = [
             np.clip(np.rint(c).astype(int), 0, m) for c, m in zip((row, column), last, strict=True)
         ]
-        if spline is None:
+        if nearest:
+            sampled = values[cell[0], cell[1]]
+        elif spline is None:
             sampled = bilinear(values, row, column)
         else:
             sampled = _spline_at(spline, column, row, (values.shape[0], values.shape[1]))
-        sampled[missing[nearest[0], nearest[1]]] = np.nan
+        sampled[missing[cell[0], cell[1]]] = np.nan
         block = np.full(inside.shape, np.nan)
         block[inside] = sampled
         out[rows] = block

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..surface.surfaces import floor_of
-from .surface_models import Box, cut_at_knots, layer_over, spline_models, times_squared_cost
+from .potentials import parts_over, potential_over
+from .surface_models import Box, cut_at_knots, layer_over, times_squared_cost
 from .taylor import (
     Model,
     constant,
@@ -25,43 +26,6 @@ from .taylor import (
     times,
     times_number,
 )
-
-
-class Potential(NamedTuple):
-    """A function u, bicubic over the cells of a grid."""
-
-    coefficients: np.ndarray  # (ny + 2, nx + 2) float64
-    x0: float  # corner of the first cell
-    y0: float
-    dx: float
-    dy: float
-
-
-@inner_kernel
-def share_of_cell(share, half):
-    """The centre of a box as a share of its cell; exact for a box on a side of the cell.
-
-    There, one of the four coefficients has the factor 0. Rounding would make it count, and it
-    can be huge, because it may belong to no cell.
-    """
-    return math.floor(share + 0.5) if half == 0.0 else share
-
-
-@inner_kernel
-def potential_over(potential, i, j, box):
-    """Taylor models of u and its slopes over a box inside cell (i, j), or on a side of it."""
-    return spline_models(
-        potential.coefficients,
-        i,
-        j,
-        share_of_cell((box.x - potential.x0) / potential.dx - i, box.a),
-        share_of_cell((box.y - potential.y0) / potential.dy - j, box.b),
-        box.a / potential.dx,
-        box.b / potential.dy,
-        potential.dx,
-        potential.dy,
-    )
-
 
 # What is proven of a box
 
@@ -100,8 +64,8 @@ def planar_distance(box, goal):
 
 
 @kernel
-def facts_of_box(surface, potential, goal, i, j, box, work):
-    """What is proven of a box inside cell (i, j) and inside one piece of the surface.
+def facts_of_part(surface, potential, goal, i, j, box, part, work):
+    """What is proven of a piece of u over a box inside cell (i, j) and one piece of the surface.
 
     With slopes g_k of the weighted layers, h = c^2 H, H = I + sum g_k g_k^T and
 
@@ -110,7 +74,7 @@ def facts_of_box(surface, potential, goal, i, j, box, work):
 
     goal (2 + layers,) is the goal's lifted point; work (2 layers, 11).
     """
-    u = potential_over(potential, i, j, box)
+    u = potential_over(potential, i, j, box, part)
     top = plus(times(u.slope_x, u.slope_x), times(u.slope_y, u.slope_y))
     bottom = constant(1.0)
     chord = planar_distance(box, goal) ** 2
@@ -137,6 +101,24 @@ def facts_of_box(surface, potential, goal, i, j, box, work):
         largest_ratio(top, bottom),
         u.value.c00 - spread(u.value),
         floor * math.sqrt(chord),
+    )
+
+
+@kernel
+def facts_of_box(surface, potential, goal, i, j, box, work):
+    """What is proven of a box inside cell (i, j) and inside one piece of the surface."""
+    parts = parts_over(potential, i, j, box)
+    facts = facts_of_part(surface, potential, goal, i, j, box, parts.first, work)
+    if parts.last == parts.first:
+        return facts
+    other = facts_of_part(surface, potential, goal, i, j, box, parts.last, work)
+    # A comparison with NaN is False, and then nothing may be proven.
+    norm = facts.norm if facts.norm >= other.norm else other.norm
+    return Facts(
+        norm if norm < math.inf else math.inf,
+        max(facts.sample, other.sample),
+        min(facts.lowest, other.lowest),
+        facts.chord,
     )
 
 
@@ -336,7 +318,18 @@ class Anchor(NamedTuple):
 
 @kernel
 def margin_of_box(surface, potential, anchor, factor, i, j, box):
-    """At most distance(anchor, p) + factor u(p) for any p of a box inside cell (i, j).
+    """At most distance(anchor, p) + factor u(p) for any p of a box inside cell (i, j)."""
+    parts = parts_over(potential, i, j, box)
+    margin = margin_of_part(surface, potential, anchor, factor, i, j, box, parts.first)
+    if parts.last == parts.first:
+        return margin
+    other = margin_of_part(surface, potential, anchor, factor, i, j, box, parts.last)
+    return min(margin, other)
+
+
+@kernel
+def margin_of_part(surface, potential, anchor, factor, i, j, box, part):
+    """The same for a piece of u.
 
     The chord is convex in R^n, so that it is nowhere below its tangent at the box's centre.
     """
@@ -347,7 +340,7 @@ def margin_of_box(surface, potential, anchor, factor, i, j, box):
         rise = layer_over(surface, k, box).value.c00 - end[2 + k]
         squared += rise * rise
     chord = math.sqrt(squared)
-    total = times_number(potential_over(potential, i, j, box).value, factor)
+    total = times_number(potential_over(potential, i, j, box, part).value, factor)
     outside_margin = anchor.far + total.c00 - spread(total)
     if chord > 0.0:
         along_x, along_y = floor * box.a * east / chord, floor * box.b * north / chord

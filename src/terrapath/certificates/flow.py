@@ -1,0 +1,335 @@
+"""The search for a lower bound where costs are constant in cells.
+
+There the slope of a distance leaps at the sides of cells, and no smooth u comes near it. So u is
+linear over triangles of a lattice whose nodes lie on these sides. It begins as half the distance
+from the start minus half that to the goal. From there u(goal) - u(start) is made as large as it
+can be where the dual norm of du is at most 1: by the algorithm of Chambolle and Pock (2011), whose
+steps are preconditioned by cosine transforms. Where the norm stays above 1, in few cells, costs are
+lowered.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from .._kernels.certificates import flow as kernels
+from .._kernels.surface.surfaces import Spline
+from .._support.watching import MustStop
+from ..problem import Problem
+from ..space.lattice import Lattice
+from ..surface.bounds import Bounds
+from ..surface.metric import inverse_metric_tensor
+from ..validation import Array, Point
+from .certificate import Certificate, certify
+from .claims import Claim, Core, cell_needs
+
+# The numbers of lattice cells on a side of a cell of constant cost; even, so that the centres of
+# cells, where the pieces of the ground meet, are on its lines, too.
+PER_CELL = (2, 4, 8)
+
+# Lattices have no more nodes than this, and finer ones than the first no more than the second.
+MOST_NODES, MOST_FINER_NODES = 300_000, 150_000
+
+# Steps of the two sizes' ratio, each with so many iterations. Then cells are tightened so often.
+RATIOS, ITERATIONS = (0.3, 1.0, 3.0, 3.0), 40
+TIGHTENINGS = 12
+
+# The search ends where so many of these in a row have raised the bound by less than this share.
+PATIENCE, GAIN = 3, 2e-4
+
+# Cells whose norm is above this are tightened.
+TOLERATED = 1.0005
+
+# Without a target, the search ends at this gap.
+GOOD_GAP = 2e-3
+
+# The cost in the search where no path can be.
+FREE = 1e30
+
+# A norm as low as this needs no closer look.
+FLAT_ENOUGH = 0.999
+
+# Fields are continued into obstacles by so many nodes.
+AROUND = 3
+
+Stepper = Callable[[float], None]
+
+
+def cell_lattices(problem: Problem, window: Bounds) -> Iterator[Lattice]:
+    """Ever finer lattices over a window, with nodes on the sides of cells of constant cost."""
+    data = problem.surface.data
+    assert isinstance(data, Spline)
+    cells = data.cells
+    size = window.width / cells.dx * window.height / cells.dy
+    # Where there are very many cells, several make one of the lattice.
+    merged = max(math.ceil(math.sqrt(size / MOST_NODES)), 1)
+    if merged > 1:
+        yield _aligned(problem, window, merged, 1)
+        return
+    first = PER_CELL[0] if size * PER_CELL[0] ** 2 <= MOST_NODES else 1
+    yield _aligned(problem, window, 1, first)
+    for per_cell in PER_CELL:
+        if first < per_cell and size * per_cell**2 <= MOST_FINER_NODES:
+            yield _aligned(problem, window, 1, per_cell)
+
+
+def _aligned(problem: Problem, window: Bounds, merged: int, per_cell: int) -> Lattice:
+    """The lattice of the cells that meet a window: ``merged`` in one, or cut in ``per_cell``."""
+    data = problem.surface.data
+    assert isinstance(data, Spline)
+    cells, axes = data.cells, []
+    for low, high, origin, step in (
+        (window.x1_min, window.x1_max, cells.x0, merged * cells.dx / per_cell),
+        (window.x2_min, window.x2_max, cells.y0, merged * cells.dy / per_cell),
+    ):
+        first = math.floor((low - origin) / step + 1e-6)
+        last = max(math.ceil((high - origin) / step - 1e-6), first + 1)
+        axes.append((origin + first * step, origin + last * step, last - first + 1))
+    (x0, x1, nx), (y0, y1, ny) = axes
+    return Lattice(Bounds(x0, y0, x1, y1), nx, ny)
+
+
+class FlowSearch:
+    """The search on one lattice.
+
+    length : of a path that is known, map units, or infinite. target_gap : where it is reached, the
+    search ends. Where it must stop, the certificate holds all the same, but may be no more than
+    the chord.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        lattice: Lattice,
+        length: float,
+        target_gap: float,
+        must_stop: MustStop,
+    ) -> None:
+        self.problem, self.lattice, self.must_stop = problem, lattice, must_stop
+        self.enough = length / (1.0 + target_gap)
+        self.u = self._between_fields(length)
+        self.costs, self.roots = self._limits()  # what norms are measured by
+        self.tightened = self.costs.copy()  # what the flow is led by
+        self.norms = np.empty_like(self.costs)
+        self.rising = np.zeros(self.costs.shape, bool)
+        self.flow, self.sources = np.zeros((*self.costs.shape, 2, 2)), np.empty_like(self.u)
+        self.ends = _weights(problem.goal, lattice) - _weights(problem.start, lattice)
+        self.best, self.best_u = -math.inf, self.u
+        self._note()
+
+    def _between_fields(self, length: float) -> Array:
+        """Half the distance from the start minus half that to the goal, at the nodes."""
+        from ..distance.field import march_both
+        from ..distance.medium import Medium
+
+        problem, bounds = self.problem, self.problem.bounds
+        inner, edges = _inside(self.lattice, bounds)
+        medium = Medium(problem.surface, inner, problem.free_space, self.must_stop)
+        fields = march_both(medium, problem.start, problem.goal, watch=lambda _: self.must_stop())
+        if math.isinf(length):
+            known = fields[0].values[np.isfinite(fields[0].values)]
+            length = float(known.max(initial=0.0))
+        costs = problem.surface.cost(inner.points)
+        begin, end = (
+            np.minimum(_into_obstacles(field.values, costs, inner), length) for field in fields
+        )
+        return np.pad(0.5 * (begin - end), edges, mode="edge")
+
+    def _limits(self) -> tuple[Array, Array]:
+        """The cost c of each cell, per cell's side, and A without it: (ny, nx, 3), symmetric."""
+        lattice, surface = self.lattice, self.problem.surface
+        assert isinstance(surface.data, Spline)
+        assert surface.bounds is not None
+        costs = np.empty((lattice.ny - 1, lattice.nx - 1))
+        kernels.fill_least_costs(surface.data.cells, lattice.data, costs)
+        low, high = np.array(surface.bounds[:2]), np.array(surface.bounds[2:])
+        middles = [0.5 * (at[1:] + at[:-1]) for at in (lattice.x, lattice.y)]
+        centres = np.clip(np.stack(np.meshgrid(*middles), axis=-1), low, high)
+        inverse = inverse_metric_tensor(surface, centres)
+        inverse *= np.square(surface.cost(centres))[..., None, None]
+        smooth = np.exp(surface.log_cost_jets(centres)[..., 0])
+        unit = math.sqrt(lattice.dx * lattice.dy)
+        inverse *= unit * unit / np.outer(lattice.spacing, lattice.spacing)
+        costs *= smooth * unit
+        covered = self.problem.free_space.covered_cells(lattice)
+        costs[covered] = FREE
+        return costs, _roots(inverse)
+
+    def _note(self) -> None:
+        """Measure u, and keep it where it proves the most so far."""
+        lattice = self.lattice
+        kernels.choose_diagonals(self.u, (lattice.dy / lattice.dx) ** 2, self.rising)
+        kernels.fill_norms(self.u, self.roots, self.costs, self.rising, self.norms)
+        value = float((self.ends * self.u).sum()) / max(float(self.norms.max()), 1e-300)
+        if value > self.best:
+            self.best, self.best_u = value, self.u.copy()
+
+    @property
+    def is_done(self) -> bool:
+        """Is the bound good enough, or must it stop?"""
+        return self.best >= self.enough or self.must_stop()
+
+    def run(self) -> None:
+        """Raise the bound until it is near enough."""
+        step = self._stepper()
+        for ratio in RATIOS:
+            step(ratio)
+            self._note()
+            if self.is_done:
+                return
+        self._correct()
+        known, idle = self.best, 0
+        for _ in range(TIGHTENINGS):
+            if self.is_done or idle == PATIENCE:
+                return
+            self.tightened /= np.maximum(self.norms / TOLERATED, 1.0)
+            step(RATIOS[-1])
+            self._note()
+            idle = 0 if self.best > known * (1.0 + GAIN) else idle + 1
+            known = max(known, self.best)
+
+    def _correct(self) -> None:
+        """On hills a cell's norm is larger than in its centre: measure by what the checker says."""
+        found = cell_needs(self.problem, self._claim(self.u), 0.0).slope
+        hidden = np.maximum(found / np.maximum(self.norms, 1e-300), 1.0)
+        hidden[self.norms < 0.5 * self.norms.max()] = 1.0
+        self.costs /= hidden
+        self.tightened /= hidden
+
+    def _stepper(self) -> Stepper:
+        """Iterations of the algorithm, with a ratio of its two steps."""
+        from scipy.fft import dctn, idctn
+
+        ny, nx = self.u.shape
+        sides = np.square(
+            np.sqrt(self.lattice.dx * self.lattice.dy) / np.array(self.lattice.spacing)
+        )
+        along_x, along_y = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n) for n in (nx, ny))
+        # The squares of the slopes of both triangles, in terms of cosines.
+        squares = 2.0 * (sides[0] * along_x + sides[1] * along_y[:, None])
+        squares[0, 0] = math.inf  # a constant changes nothing
+        typical = max(self.best, 1e-300) / max(math.hypot(*self._steps_apart()), 1.0)
+
+        def step(ratio: float) -> None:
+            # Costs in cells of the lattice, along the path, are 1 then.
+            sigma, tau = math.sqrt(ratio) / typical, typical / math.sqrt(ratio)
+            ahead = self.u
+            for _ in range(ITERATIONS):
+                if self.must_stop():
+                    return
+                kernels.step_flow(
+                    ahead, self.roots, self.tightened, self.rising, 0.99 * sigma, self.flow
+                )
+                kernels.fill_sources(self.flow, self.roots, self.rising, self.sources)
+                change = idctn(dctn(self.ends - self.sources, norm="ortho") / squares, norm="ortho")
+                ahead = self.u + 2.0 * tau * change
+                self.u = self.u + tau * change
+
+        return step
+
+    def _steps_apart(self) -> Array:
+        """How far the goal is from the start, in cells of the lattice."""
+        return np.subtract(self.problem.goal, self.problem.start) / self.lattice.spacing
+
+    def _claim(self, u: Array) -> Claim:
+        """A claim that is not proven yet."""
+        problem, lattice = self.problem, self.lattice
+        return Claim(
+            value=0.0,
+            norm=math.inf,
+            coefficients=np.pad(u, 1, mode="edge"),
+            bounds=lattice.bounds,
+            horizon=float((_weights(problem.goal, lattice) * u).sum()),
+            start_core=_core(problem.start, lattice),
+            goal_core=_core(problem.goal, lattice),
+        )
+
+    def certify(self) -> Certificate:
+        """The certificate that the best u makes."""
+        begin = float((_weights(self.problem.start, self.lattice) * self.best_u).sum())
+        claim = self._claim(self.best_u - begin)
+        needs = cell_needs(self.problem, claim, FLAT_ENOUGH, self.must_stop)
+        return certify(self.problem, claim, needs, self.must_stop)
+
+
+def _into_obstacles(values: Array, costs: Array, lattice: Lattice) -> Array:
+    """Distances (ny, nx), continued to nodes in obstacles, where cells may be partly free."""
+    for _ in range(AROUND):
+        missing = ~np.isfinite(values)
+        if not missing.any():
+            break
+        around = np.pad(values, 1, constant_values=math.inf)
+        ny, nx = values.shape
+        least = np.full_like(values, math.inf)
+        for j in range(3):
+            for i in range(3):
+                step = math.hypot((i - 1) * lattice.dx, (j - 1) * lattice.dy)
+                least = np.minimum(least, around[j : j + ny, i : i + nx] + step * costs)
+        values = np.where(missing, least, values)
+    return values
+
+
+def _inside(lattice: Lattice, bounds: Bounds) -> tuple[Lattice, list[tuple[int, int]]]:
+    """The part of a lattice inside bounds, and how many rows and columns lie outside."""
+    ranges = []
+    for at, low, high, step in (
+        (lattice.y, bounds.x2_min, bounds.x2_max, lattice.dy),
+        (lattice.x, bounds.x1_min, bounds.x1_max, lattice.dx),
+    ):
+        known = np.flatnonzero((at >= low - 1e-9 * step) & (at <= high + 1e-9 * step))
+        ranges.append((known[0], known[-1], len(at)))
+    (j0, j1, rows), (i0, i1, columns) = ranges
+    x, y = np.clip(lattice.x, *bounds[::2]), np.clip(lattice.y, *bounds[1::2])
+    inner = Lattice(Bounds(x[i0], y[j0], x[i1], y[j1]), int(i1 - i0) + 1, int(j1 - j0) + 1)
+    return inner, [(int(j0), int(rows - 1 - j1)), (int(i0), int(columns - 1 - i1))]
+
+
+def _place(point: Point, lattice: Lattice) -> Array:
+    """Column and row of a point, in nodes."""
+    return np.subtract(point, lattice.bounds[:2]) / lattice.spacing
+
+
+def _weights(point: Point, lattice: Lattice) -> Array:
+    """The weights (ny, nx) of the nodes at a point, in bilinear interpolation."""
+    weights = np.zeros((lattice.ny, lattice.nx))
+    s, t = _place(point, lattice)
+    i, j = min(int(s), lattice.nx - 2), min(int(t), lattice.ny - 2)
+    s, t = s - i, t - j
+    weights[j : j + 2, i : i + 2] = np.outer([1.0 - t, t], [1.0 - s, s])
+    return weights
+
+
+def _core(point: Point, lattice: Lattice) -> Core:
+    """The cells that hold or touch a point."""
+    (low_x, low_y), (high_x, high_y) = (
+        (np.floor(_place(point, lattice) + shift).astype(int)).tolist() for shift in (-1e-9, 1e-9)
+    )
+    return Core(
+        min(max(low_x, 0), lattice.nx - 2),
+        min(high_x + 1, lattice.nx - 1),
+        min(max(low_y, 0), lattice.ny - 2),
+        min(high_y + 1, lattice.ny - 1),
+    )
+
+
+def _roots(tensors: Array) -> Array:
+    """The square roots of tensors (..., 2, 2), as (..., 3): a11, a12 and a22."""
+    a, b, d = tensors[..., 0, 0], tensors[..., 0, 1], tensors[..., 1, 1]
+    root = np.sqrt(np.maximum(a * d - b * b, 0.0))
+    per = np.sqrt(a + d + 2.0 * root)
+    return np.ascontiguousarray(np.stack([a + root, b, d + root], axis=-1) / per[..., None])
+
+
+def cell_certificates(
+    problem: Problem, window: Bounds, length: float, target_gap: float, must_stop: MustStop
+) -> Iterator[Certificate]:
+    """Certificates from ever finer lattices, where costs are constant in cells."""
+    for lattice in cell_lattices(problem, window):
+        search = FlowSearch(problem, lattice, length, target_gap or GOOD_GAP, must_stop)
+        search.run()
+        yield search.certify()
+        if must_stop():
+            return

@@ -1,0 +1,109 @@
+"""Lower bounds where costs are constant in cells: piecewise linear potentials and their proofs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import terrapath as tp
+from cost_rasters import CELL, Walker, random_costs, random_heights
+from terrapath._kernels.certificates import norms
+from terrapath._kernels.certificates.potentials import Potential, linear_value
+from terrapath._kernels.certificates.surface_models import Box
+from terrapath.certificates.certificate import seal_of
+from terrapath.errors import CertificateError
+
+
+def problem_of(seed, count=24, steep=0.0, **options):
+    random, axis = np.random.default_rng(seed), CELL * np.arange(count)
+    costs, heights = random_costs(random, count), random_heights(random, count, steep)
+    surface = tp.read_surface((heights, axis, axis), costs={"going": (costs, axis, axis)})
+    top = axis[-1]
+    return (
+        tp.Problem(surface, (12.0, 17.0), (top - 14.0, top - 21.0), **options),
+        Walker(costs, heights, axis, axis),
+    )
+
+
+def interpolated(values, s, t):
+    """The piecewise linear function through values (ny, nx) at (s, t), and its slopes, in cells."""
+    i, j = min(int(s), values.shape[1] - 2), min(int(t), values.shape[0] - 2)
+    a, b, c, d = values[j, i], values[j, i + 1], values[j + 1, i], values[j + 1, i + 1]
+    rising = [(b - a, d - b), (d - c, c - a)]
+    falling = [(b - a, c - a), (d - c, d - b)]
+    s, t = s - i, t - j
+    if max(np.hypot(*g) for g in rising) < max(np.hypot(*g) for g in falling):
+        slope = rising[0] if t <= s else rising[1]
+        return a + s * slope[0] + t * slope[1], slope
+    if s + t <= 1.0:
+        return a + s * falling[0][0] + t * falling[0][1], falling[0]
+    return d - (1.0 - s) * falling[1][0] - (1.0 - t) * falling[1][1], falling[1]
+
+
+@pytest.mark.parametrize("steep", [0.0, 1.0])
+def test_the_facts_of_a_box_hold_at_all_its_points(steep):
+    problem, walker = problem_of(3, steep=steep)
+    surface, random = problem.surface, np.random.default_rng(8)
+    values = random.normal(0.0, 30.0, (12, 12))
+    potential = Potential(np.pad(values, 1, mode="edge"), 25.0, 25.0, 5.0, 5.0, True)
+    goal = surface.lift(np.array(problem.goal))
+    for _ in range(200):
+        i, j = random.integers(0, 11, 2)
+        low, high = np.sort(random.uniform(0.0, 1.0, (2, 2)), axis=0)
+        x0, x1 = 25.0 + 5.0 * (i + low[0]), 25.0 + 5.0 * (i + high[0])
+        y0, y1 = 25.0 + 5.0 * (j + low[1]), 25.0 + 5.0 * (j + high[1])
+        box = Box(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0))
+        work = np.empty((2, 11))
+        facts = norms.facts_of_box(surface.data, potential, goal, i, j, box, work)
+        for x, y in random.uniform((x0, y0), (x1, y1), (9, 2)):
+            u, slope = interpolated(values, (x - 25.0) / 5.0, (y - 25.0) / 5.0)
+            assert linear_value(potential, x, y) == pytest.approx(u, abs=1e-9)
+            assert facts.lowest <= u + 1e-9
+            du = np.array(slope) / 5.0
+            gradient = surface.gradients((x, y))[0]
+            inverse = np.linalg.inv(np.eye(2) + np.outer(gradient, gradient))
+            cost = walker.costs[round(y / CELL), round(x / CELL)]
+            assert facts.norm >= du @ inverse @ du / cost**2 * (1.0 - 1e-9)
+
+
+@pytest.mark.parametrize(("seed", "steep"), [(0, 0.0), (1, 0.0), (2, 0.6), (3, 1.5)])
+def test_no_path_is_shorter_than_the_bound(seed, steep):
+    problem, walker = problem_of(seed, steep=steep)
+    solution = tp.plan(problem, "a-star", neighbours=32, spacing=CELL / 2.0, refine=True)
+    bound = tp.lower_bound(problem, length=solution.length, target_gap=0.005)
+    assert bound.value <= walker.length(solution.path.points) * (1.0 + 1e-9)
+    if steep == 0.0:
+        assert solution.length <= 1.02 * bound.value
+    bound.check(problem)
+
+
+def test_bounds_that_cut_cells_and_obstacles_are_proven_with():
+    import shapely
+
+    obstacles = [shapely.box(70.0, 60.0, 110.0, 183.0)]
+    problem, _ = problem_of(4, bounds=(3.0, 8.0, 223.0, 219.0), obstacles=obstacles)
+    solution = tp.plan(problem, "optimal", target_gap=0.04)
+    assert solution.gap <= 0.05
+    assert solution.certificate is not None
+    solution.certificate.check(problem)
+
+
+def test_a_forged_bound_is_refused(tmp_path):
+    problem, _ = problem_of(5)
+    made = tp.lower_bound(problem)
+    made.check(problem)
+    steeper = made.coefficients.copy()
+    steeper[10, 10] += 50.0
+    for change in (
+        {"value": 1.01 * made.value},
+        {"norm": 0.99 * made.norm},
+        {"coefficients": steeper},
+        {"coefficients": 1.01 * made.coefficients},
+    ):
+        forged = replace(made, **change)
+        forged = replace(forged, seal=seal_of(forged))
+        with pytest.raises(CertificateError):
+            forged.check(problem)
+    other, _ = problem_of(6)
+    with pytest.raises(CertificateError):
+        made.check(other)
