@@ -26,7 +26,6 @@ from ..surface.bounds import Bounds
 from ..validation import Array, require_positive
 from .certificate import Certificate, certify
 from .claims import Claim, Core, Needs, cell_needs
-from .flow import cell_certificates
 
 T = TypeVar("T", np.float64, np.bool_)
 
@@ -211,6 +210,8 @@ def certificates(
     """
     window = search_window(problem, length)
     if problem.surface.cost_cells is not None:
+        from .flow import cell_certificates
+
         yield from cell_certificates(problem, window, length, target_gap, must_stop)
         return
     cap = length * (1.0 + 1e-6)
