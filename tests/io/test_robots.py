@@ -270,3 +270,14 @@ def test_what_is_no_cloud_is_refused_in_one_line(tmp_path, name, content):
     with pytest.raises(tp.MapError) as caught:
         tp.read_surface(tmp_path / name)
     assert name in one_line(caught)
+
+
+def test_a_damaged_laz_file_does_not_abort_the_process(tmp_path):
+    path = write_cloud(tmp_path / "cloud.laz", cloud(400))
+    content = bytearray(path.read_bytes())
+    start = int.from_bytes(content[96:100], "little")
+    table = int.from_bytes(content[start : start + 8], "little", signed=True)
+    content[table + 4 : table + 8] = b"\xff\xff\xff\xf0"
+    path.write_bytes(content)
+    with pytest.raises(tp.MapError, match="chunks"):
+        tp.read_surface(path)

@@ -94,8 +94,27 @@ def _of_las(path: Path) -> tuple[Array, CRS | None]:
     )
     import laspy
 
+    if path.suffix.lower() == ".laz":
+        _require_moderate_chunks(path)
     cloud = laspy.read(path)
     return np.column_stack([cloud.x, cloud.y, cloud.z]), parse_crs(cloud.header.parse_crs())
+
+
+def _require_moderate_chunks(path: Path) -> None:
+    """Raise MapError where a LAZ file claims absurdly many chunks, for which lazrs would abort."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(96)  # where the header says where the points begin
+        start = int.from_bytes(file.read(4), "little")
+        file.seek(min(start, size))
+        table = int.from_bytes(file.read(8), "little", signed=True)
+        if table == -1:  # written as a stream: the place is at the end
+            file.seek(max(size - 8, 0))
+            table = int.from_bytes(file.read(8), "little", signed=True)
+        file.seek(min(max(table, 0), size))
+        chunks = int.from_bytes(file.read(8)[4:], "little")
+    if chunks > size:
+        raise MapError(f"{path} is damaged: it claims {chunks:,} chunks in {size:,} bytes")
 
 
 def _of_ply(path: Path) -> tuple[Array, CRS | None]:
