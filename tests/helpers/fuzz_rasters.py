@@ -122,7 +122,6 @@ FILES = {
     "erdas.img": lambda path: geotiff(path, driver="HFA"),
     "map.yaml": robot,
     "grid.map": letters,
-    "hills.png": lambda path: picture(path, driver="PNG"),
     "cloud.csv": text_points,
     "cloud.las": laser,
     "cloud.laz": laser,

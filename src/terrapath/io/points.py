@@ -22,6 +22,7 @@ from .rasters import reading, with_crs
 
 MOST_CELLS = 150_000_000
 FEWEST = 16  # points of a map
+FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 POINTS_IN_CELL = 4.0  # on average, where no cell is given
 
 NAMES = (("x", "easting", "lon", "longitude"), ("y", "northing", "lat", "latitude"),
@@ -41,6 +42,8 @@ def open_points(
     with reading(path):
         points, own = READERS[read](path)
     points = points[np.isfinite(points).all(axis=1)]
+    if len(points) and np.abs(points).max() > FARTHEST:
+        raise MapError(f"{path} has a point beyond {FARTHEST:g}, where no map is; remove it")
     if len(points) < FEWEST:
         raise MapError(f"{path} holds {len(points)} points; a map needs at least {FEWEST}")
     low, span = points[:, :2].min(axis=0), np.ptp(points[:, :2], axis=0)
