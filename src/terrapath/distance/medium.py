@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.distance import bellman, calendar_queue, edges, ground, hopf_lax, star
+from .._kernels.distance import bellman, calendar_queue, edges, ground, hopf_lax, ray, star
 from .._kernels.space.free_space import Grid
 from .._kernels.surface.cells import NO_CELLS, CostCells
 from .._kernels.surface.metric_rows import columns_of, fill_samples
@@ -147,7 +147,7 @@ class Medium:
         seeds = (rows * lattice.nx + columns)[near].astype(np.int64)
         costs, per = np.empty(len(seeds)), 2 * self.ground.pieces
         nodes = np.column_stack([columns[near], rows[near]]).astype(np.float64)
-        ground.fill_rays(self.ground, per * place[0], per * place[1], per * nodes, costs)
+        ray.fill_rays(self.ground, per * place[0], per * place[1], per * nodes, costs)
         least = chord(self.surface, np.broadcast_to(source, points[near].shape), points[near])
         return seeds, np.maximum(costs, least)
 

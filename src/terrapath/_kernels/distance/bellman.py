@@ -20,11 +20,11 @@ from .ground import (
     flat,
     place_at,
     plus_rise,
-    ray,
     read,
     smooth_floor,
     times_cells,
 )
+from .ray import ray
 from .segments import NO_SEGMENT, End, Segment, place_of_least, value_on
 from .star import ACUTE, EAST, NORTH, X, Y, beside, bits_of, cost_along, direction_of
 

@@ -6,7 +6,8 @@ from ..bits import lowest_bit
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
 from ..surface.cells import any_cells
-from .ground import ray, sampled_piece, seen_from, zero
+from .ground import sampled_piece, seen_from, zero
+from .ray import ray
 from .star import EAST, EIGHTH, HALF, NORTH, place_of_other
 
 # A node that waits, and the number of the sample at it.
