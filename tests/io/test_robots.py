@@ -96,6 +96,7 @@ def test_a_turned_map_of_nav2_lies_where_its_origin_says(tmp_path):
         ({"resolution": 0}, "resolution"),
         ({"resolution": "wide"}, "resolution"),
         ({"origin": "[1, 2]"}, "origin"),
+        ({"origin": "[1, 2, 1e308]"}, "origin"),
         ({"mode": "odd"}, "mode"),
         ({"free_thresh": 0.9}, "free_thresh"),
         ({"negate": "[]"}, "negate"),

@@ -23,6 +23,7 @@ Cells = npt.NDArray[np.bool_]
 
 MOST_CELLS = 150_000_000
 MOST_BYTES = 1_000_000  # of a description
+FARTHEST, FARTHEST_TURN = 1e12, 1e3  # metres and radians; beyond that nothing is precise
 MODES = ("trinary", "scale", "raw")
 OCCUPIED = 100.0
 PASSABLE = b".GS"  # ground and shallow water, in maps of MovingAI
@@ -104,7 +105,7 @@ def _origin(path: Path, about: dict[str, Any]) -> tuple[float, float, float]:
     given = about.get("origin", [0.0, 0.0, 0.0])
     try:
         x, y, yaw = (float(value) for value in given)
-        if not all(map(math.isfinite, (x, y, yaw))):
+        if not (max(abs(x), abs(y)) < FARTHEST and abs(yaw) < FARTHEST_TURN):
             raise ValueError
     except (TypeError, ValueError):
         raise MapError(f"{path}: origin={given!r:.60} is not three numbers, [x, y, yaw]") from None
