@@ -15,7 +15,6 @@ from pyproj import CRS
 from ..errors import InputError, MapError, MapWarning, tell
 from ..surface import Surface
 from ..surface.bounds import as_bounds
-from ..surface.costs import CellLayers, with_cells
 from ..surface.georeference import Georeference, metres_of
 from ..surface.raster import Grid, Raster
 from ..validation import Array, require_count, require_not_negative
@@ -24,6 +23,7 @@ from .rasters import gdal
 from .sources import LayerSource, NoData, Source, Unsaid
 
 if TYPE_CHECKING:
+    from ..surface.costs import CellLayers
     from ..surface.layers import Kind
     from .undeclared import Fills
 
@@ -105,6 +105,8 @@ class OpenMap:
                 smoothing=scale,
             )
         if cells is not None:
+            from ..surface.costs import with_cells
+
             surface = with_cells(surface, cells)
         return replace(surface, source=self.heights.band.label)
 

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
 from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
@@ -69,9 +67,8 @@ class Optimal:
     Candidates are the straight line, on flat ground the shortest path round the corners of
     obstacles, and the routes of the distance fields from both ends. Where the fields leave a
     doubt, on rough ground and among obstacles, fields on ever finer lattices follow, A* with 32, 16
-    and 8 neighbours, and a tree. Where costs are constant in cells, the shortest path through
-    points on their sides is one, too, and leaves no doubt. All but the straight line are refined.
-    The route from a start to a goal is the same as back.
+    and 8 neighbours, and a tree; where costs are in cells, instead, the sides of cells. All but the
+    straight line are refined. The route from a start to a goal is the same as back.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the shortest path before
     refinement; it is also the path returned where the run ends before a route was refined.
@@ -206,13 +203,11 @@ class _Run:
         self.refine(taut.path)
 
     def try_sides(self) -> None:
-        """The shortest path through points on the sides of cells of constant cost."""
-        path = shortest_through_cells(self.problem, self.must_stop)
-        if path is not None:
+        """The shortest path through points on the sides of cost cells; fields show others."""
+        if (path := shortest_through_cells(self.problem, self.must_stop)) is not None:
+            self.is_through_cells = True
             self.keep_unrefined(path)
             self.refine(path)
-            # A path across all cells, each at its own cost; fields show other routes.
-            self.is_through_cells = True
 
     def try_fields(self) -> None:
         """The routes of distance fields, on a finer lattice where a coarse one shows none."""
@@ -287,16 +282,10 @@ class _Run:
 
     def window(self) -> Bounds:
         """The part of the bounds where a route could be shorter than the best, by the fields."""
-        lattice = self.fields[0].lattice
-        detours = self.fields[0].values + self.fields[1].values
-        slack = max(SLACK, 2.0 * abs(self.distance / self.best - 1.0))
-        rows, columns = np.nonzero(detours <= self.best * (1.0 + slack))
-        if not len(rows):
-            return self.problem.bounds
-        x, y = lattice.x, lattice.y
-        west, east = max(columns.min() - 2, 0), min(columns.max() + 2, lattice.nx - 1)
-        south, north = max(rows.min() - 2, 0), min(rows.max() + 2, lattice.ny - 1)
-        return Bounds(float(x[west]), float(y[south]), float(x[east]), float(y[north]))
+        one, other = self.fields
+        longest = self.best * (1.0 + max(SLACK, 2.0 * abs(self.distance / self.best - 1.0)))
+        near = one.values + other.values <= longest
+        return one.lattice.around(near) if near.any() else self.problem.bounds
 
     # Routes
 

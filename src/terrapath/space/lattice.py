@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from .._kernels.space.free_space import Grid
 from ..errors import InputError
@@ -94,6 +95,14 @@ class Lattice:
         if min(nx, ny) < 2 or nx * ny > MOST_NODES:
             return spanning
         return cls(Bounds(low_x, low_y, high_x, high_y), nx, ny)
+
+    def around(self, nodes: npt.NDArray[np.bool_]) -> Bounds:
+        """The bounds of some nodes (ny, nx), with two rows and columns more on all sides."""
+        rows, columns = np.nonzero(nodes)
+        west, east = max(columns.min() - 2, 0), min(columns.max() + 2, self.nx - 1)
+        south, north = max(rows.min() - 2, 0), min(rows.max() + 2, self.ny - 1)
+        x, y = self.x, self.y
+        return Bounds(float(x[west]), float(y[south]), float(x[east]), float(y[north]))
 
     @property
     def spacing(self) -> Spacing:

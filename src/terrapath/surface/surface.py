@@ -17,7 +17,6 @@ from .._support.extras import require_packages
 from ..errors import InputError, OutsideSurfaceError
 from ..validation import Array, as_array, as_points, require_not_negative, require_positive
 from .bounds import Bounds, Cells, Mask, as_bounds
-from .costs import CellLayers, cost_cells, cost_values_at, fit_costs
 from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
 from .layers import (
@@ -32,6 +31,7 @@ from .layers import (
 
 if TYPE_CHECKING:
     from .carrying import Native
+    from .costs import CellLayers
     from .smoothing import Smoothing
 
 
@@ -179,7 +179,12 @@ class Surface:
         bounds = Bounds(float(x[0]), float(y[0]), float(x[-1]), float(y[-1]))
         scale = _scale_of(smoothing, bounds)
         fitted = fit_grid(array[is_rise] if costs else array, x, y, weights_of(rises), scale)
-        logs, cells = fit_costs(array, x, y, made, scale)
+        data, logs, cells = fitted.spline, None, None
+        if costs:
+            from .costs import cost_cells, fit_costs
+
+            logs, cells = fit_costs(array, x, y, made, scale)
+            data = with_costs(data, logs, cost_cells(cells, costs))
         fit = Fit(
             f"bicubic spline through {len(x)} x {len(y)} samples",
             fitted.value_error,
@@ -187,7 +192,6 @@ class Surface:
         )
         spacing = float(min(np.diff(x).max(), np.diff(y).max()))
         resolution = spacing if fitted.smoothing is None else fitted.smoothing.resolution(spacing)
-        data = with_costs(fitted.spline, logs, cost_cells(cells, costs))
         made_of = (rises, bounds, fit, resolution, nodata, georeference, costs, logs, cells)
         return cls(data, *made_of, is_raster=True)
 
@@ -282,7 +286,9 @@ class Surface:
         logs = self.cost_data
         if logs is not None:
             logs = logs._replace(weights=weights_of(costs, "cost"))
-        if isinstance(data, Spline):
+        if costs and isinstance(data, Spline):
+            from .costs import cost_cells
+
             data = with_costs(data, logs, cost_cells(self.cost_cells, costs))
         return replace(self, data=data, layers=layers, costs=costs, cost_data=logs)
 
@@ -360,6 +366,10 @@ class Surface:
     def cost_values(self, points: npt.ArrayLike) -> Array:
         """Points (..., 2) -> (..., costs): the value of each cost layer, without its weight."""
         flat, shape = self._points(points)
+        if not self.costs:
+            return np.empty((*shape, 0))
+        from .costs import cost_values_at
+
         values = cost_values_at(self.data, self.costs, self.cost_data, self.cost_cells, flat)
         return values.reshape(*shape, len(self.costs))
 
