@@ -11,8 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 import terrapath as tp
 from common import fitted_order
-from terrapath.distance.eikonal import Eikonal
-from terrapath.distance.source import model_source
+from terrapath.distance.eikonal import Eikonal, model_source
 from terrapath.surface.bounds import Bounds
 
 

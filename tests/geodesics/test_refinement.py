@@ -24,7 +24,7 @@ from oracles import (
 )
 from terrapath._kernels.geodesics import contacts
 from terrapath.geodesics.refinement import newton
-from terrapath.geodesics.refinement.curve import spline_through
+from terrapath.geodesics.refinement.newton import spline_through
 from terrapath.problem import scenes
 from terrapath.surface import metric
 

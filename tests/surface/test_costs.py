@@ -11,7 +11,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
 import terrapath as tp
-from terrapath.distance.source import near_distance
+from terrapath.distance.eikonal import near_distance
 from terrapath.errors import CertificateError, InputError
 from terrapath.geodesics import refinement
 from terrapath.geodesics.rays import (

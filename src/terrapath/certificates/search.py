@@ -18,8 +18,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from .._support.watching import MustStop, never, stop_after
-from ..distance.eikonal import Eikonal
-from ..distance.source import model_source, near_distance, window_radius
+from ..distance.eikonal import Eikonal, model_source, near_distance, window_radius
 from ..problem import Problem
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds

@@ -139,10 +139,9 @@ class _Run:
     @property
     def rival(self) -> float:
         """The length that a further route must be below to be of use, map units."""
-        is_enough = len(self.found) >= self.planner.routes
-        return (
-            min((path.length for path in self.found), default=math.inf) if is_enough else math.inf
-        )
+        if len(self.found) < self.planner.routes:
+            return math.inf
+        return min(path.length for path in self.found)
 
     def must_stop(self, settled: int = 0) -> bool:
         progress = Progress(
@@ -197,10 +196,9 @@ class _Run:
     def try_corners(self) -> None:
         """The exact shortest path on flat ground."""
         taut = shortest_taut_path(self.problem, watch=self.must_stop)
-        if taut.path is None:
-            return
-        self.is_exact = not self.problem.free_space.circles
-        self.refine(taut.path)
+        if taut.path is not None:
+            self.is_exact = not self.problem.free_space.circles
+            self.refine(taut.path)
 
     def try_sides(self) -> None:
         """The shortest path through points on the sides of cost cells; fields show others."""
@@ -301,11 +299,10 @@ class _Run:
 
     def polish(self) -> None:
         """Refine the best route again while it gains: on rough ground once is not all."""
-        if not is_rough(self.problem.surface, self.problem.bounds):
-            return
-        for _ in range(MOST_POLISHES):
+        rounds = MOST_POLISHES if is_rough(self.problem.surface, self.problem.bounds) else 0
+        for _ in range(rounds if self.found else 0):
             before = self.best
-            if not self.found or self.stopper.stopped_by or self.stopper.is_late():
+            if self.stopper.stopped_by or self.stopper.is_late():
                 return
             self.trying = REFINING
             self.refine(min(self.found, key=lambda route: route.length))

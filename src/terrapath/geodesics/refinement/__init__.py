@@ -14,8 +14,14 @@ from ...problem import Path, Problem
 from ...surface import Surface
 from ...surface.metric import feature_size, is_rough
 from ...validation import Array, as_array, require_positive
-from .curve import along, curve_through
-from .newton import correct, lift, placed_parameters, shortest_polyline
+from .newton import (
+    along,
+    correct,
+    curve_through,
+    lift,
+    placed_parameters,
+    shortest_polyline,
+)
 
 __all__ = ["refine", "shortest_polyline"]
 

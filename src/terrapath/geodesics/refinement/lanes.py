@@ -23,7 +23,7 @@ from ..._support.watching import MustStop, never
 from ...problem import Problem
 from ...surface.metric import feature_size
 from ...validation import Array
-from .curve import along
+from .newton import along
 from .walls import corners_near
 
 # The spacing of points, stage by stage, in features of the surface; and a stage is over where the

@@ -16,8 +16,7 @@ from ...surface import Surface
 from ...validation import Array
 from .clear import is_clear, moved_clear
 from .contacts import NONE, Band, adopted, advanced, outwards, subdivided, tightened
-from .curve import curve_through
-from .newton import correct, placed_parameters, settle
+from .newton import correct, curve_through, placed_parameters, settle
 from .walls import FEWEST_SIDES, MOST_SIDES, Surroundings, surroundings, widest_clearance
 
 # Where obstacles leave no room for the widest clearance, a tenth of it is tried, and so on.
