@@ -98,7 +98,7 @@ def test_an_ordinary_archive_is_read(tmp_path):
     dem = write(tmp_path / "dem.tif", HEIGHTS)
     with zipfile.ZipFile(tmp_path / "maps.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.write(dem, "dem.tif")
-    require_moderate_archive(tmp_path / "maps.zip")
+    require_moderate_archive(tmp_path / "maps.zip", allow_external=False)
     surface = tp.read_surface(f"/vsizip/{tmp_path}/maps.zip/dem.tif")
     assert surface.bounds == tp.read_surface(dem).bounds
 
@@ -199,6 +199,151 @@ def test_descriptions_that_would_swell_or_are_broken_are_refused(tmp_path, conte
     with pytest.raises(tp.MapError, match=shown) as caught:
         tp.read_surface(tmp_path / "map.vrt")
     one_line(caught)
+
+
+def inline(target):
+    """XML of a virtual raster as a name: no file, and yet GDAL reads what it names."""
+    return (
+        "<VRTDataset rasterXSize='10' rasterYSize='12'><VRTRasterBand dataType='Float64' band='1'>"
+        f"<SimpleSource><SourceFilename>{target}</SourceFilename></SimpleSource></VRTRasterBand>"
+        "</VRTDataset>"
+    )
+
+
+def escaped(text):
+    return text.replace("&", "&amp;").replace("<", "&lt;")
+
+
+@pytest.mark.parametrize("before", ["", " \n", "x"])
+@pytest.mark.parametrize("depth", [1, 2])
+def test_a_description_in_a_name_reaches_out(folders, before, depth):
+    here, elsewhere = folders
+    source = elsewhere / "dem.tif"
+    for _ in range(depth):
+        source = escaped(before + inline(source))
+    path = virtual(here / "map.vrt", source)
+    with pytest.raises(tp.MapError, match="is elsewhere") as caught:
+        tp.read_surface(path)
+    assert "--allow-external" in one_line(caught)
+    if not before.strip():
+        assert tp.read_surface(path, allow_external=True).nodata is None
+    assert reaches_out('{"type": "gdal_streamed_alg"}', here)
+
+
+def test_a_name_in_an_attribute_is_a_name_too(folders):
+    here, elsewhere = folders
+    path = virtual(here / "map.vrt", "dem.tif", 1)
+    text = path.read_text().replace(
+        "<SourceFilename relativeToVRT='1'>dem.tif</SourceFilename>", ""
+    )
+    path.write_text(
+        text.replace("<SimpleSource>", f"<SimpleSource SourceFilename='{elsewhere}/dem.tif'>")
+    )
+    assert tp.read_surface(path, allow_external=True).nodata is None  # GDAL reads it
+    with pytest.raises(tp.MapError, match="is elsewhere"):
+        tp.read_surface(path)
+
+
+def test_other_elements_of_virtual_rasters_name_files_too(folders):
+    here, elsewhere = folders
+    path = virtual(here / "map.vrt", "dem.tif", 1)
+    plain = path.read_text()
+    for element, shown in (
+        (f"<OpenOptions><OOI key='GFS_TEMPLATE'>{elsewhere}/a.gfs</OOI></OpenOptions>", "opens"),
+        (f"<Metadata><MDI key='X_DATASET'>{elsewhere}/x.tif</MDI></Metadata>", "is elsewhere"),
+        (f"<Argument name='gain_dataset_filename_1'>{elsewhere}/x.tif</Argument>", "is elsewhere"),
+        (f"<RPCTransformer><DEMPath>{elsewhere}/x.tif</DEMPath></RPCTransformer>", "is elsewhere"),
+    ):
+        path.write_text(plain.replace("</VRTDataset>", f"{element}</VRTDataset>"))
+        with pytest.raises(tp.MapError, match=shown) as caught:
+            tp.read_surface(path)
+        assert "--allow-external" in one_line(caught)
+    harmless = "<OpenOptions><OOI key='NUM_THREADS'>2</OOI></OpenOptions>"
+    path.write_text(plain.replace("</SimpleSource>", f"{harmless}</SimpleSource>"))
+    assert tp.read_surface(path).nodata is None
+
+
+@pytest.mark.parametrize("name", ["missing.tif", "folder", "/vsizip/maps.zip/map.vrt", "@dummy@"])
+def test_a_source_that_cannot_be_looked_into_is_refused(folders, name):
+    here, elsewhere = folders
+    (here / "folder").mkdir()
+    with zipfile.ZipFile(here / "maps.zip", "w") as archive:
+        archive.write(virtual(here / "map.vrt", elsewhere / "dem.tif"), "map.vrt")
+    with pytest.raises(tp.MapError, match="no file that can be looked into") as caught:
+        tp.read_surface(virtual(here / "outer.vrt", name, 1))
+    assert "--allow-external" in one_line(caught)
+
+
+def test_a_driver_and_a_file_in_a_name_are_looked_into(folders):
+    here, elsewhere = folders
+    virtual(here / "a.nc", elsewhere / "dem.tif")
+    with pytest.raises(tp.MapError, match=r"dem\.tif.*is elsewhere"):
+        tp.read_surface(virtual(here / "map.vrt", "NETCDF:a.nc:band1", 1))
+
+
+def test_an_archive_holds_no_description_without_leave(folders):
+    here, elsewhere = folders
+    for maps in (here / "maps.zip", here / "maps.kmz"):
+        with zipfile.ZipFile(maps, "w") as archive:
+            archive.write(virtual(here / "map.vrt", elsewhere / "dem.tif"), "map.vrt")
+    name = f"/vsizip/{here}/maps.zip/map.vrt"
+    assert tp.read_surface(name, allow_external=True).nodata is None
+    for call in (
+        lambda: tp.read_surface(name),
+        lambda: tp.read_obstacles(here / "maps.zip", PLACE),
+        lambda: tp.read_obstacles(here / "maps.kmz", PLACE),
+    ):
+        with pytest.raises(tp.MapError, match="only says where the data are") as caught:
+            call()
+        assert "--allow-external" in one_line(caught)
+
+
+def test_virtual_vectors_name_no_description_and_no_query(folders):
+    here, elsewhere = folders
+    frame = geopandas.GeoDataFrame(geometry=[shapely.box(0, 0, 1, 1)], crs="EPSG:32633")
+    for folder in folders:
+        frame.to_file(folder / "walls.gpkg")
+    walls = here / "walls.vrt"
+
+    def layer(source, more=""):
+        return (
+            "<OGRVRTDataSource><OGRVRTLayer name='walls'><SrcDataSource relativeToVRT='1'>"
+            f"{source}</SrcDataSource>{more}</OGRVRTLayer></OGRVRTDataSource>"
+        )
+
+    walls.write_text(layer("walls.gpkg"))
+    assert len(tp.read_obstacles(walls, PLACE)) == 1
+    query = f"<SrcSQL>SELECT * FROM '{elsewhere}/walls.gpkg'.walls</SrcSQL>"
+    for text, shown in (
+        (layer(escaped(layer(f"{elsewhere}/walls.gpkg"))), "is elsewhere"),
+        (layer("missing.gpkg"), "no file that can be looked into"),
+        (layer("walls.gpkg", query), "query"),
+    ):
+        walls.write_text(text)
+        with pytest.raises(tp.MapError, match=shown):
+            tp.read_obstacles(walls, PLACE)
+
+
+@pytest.mark.parametrize("name", ["ST_A", "NITFMap", "GDAL_WMS", "GDALTileIndexDataset"])
+def test_maps_and_vectors_go_through_one_door(tmp_path, name):
+    path = tmp_path / "map.tif"
+    path.write_text(f"<{name}></{name}>")
+    for read in (tp.read_surface, lambda path: tp.read_obstacles(path, PLACE)):
+        with pytest.raises(tp.MapError, match="service elsewhere"):
+            read(path)
+
+
+def test_the_picture_of_a_nav2_map_reaches_out_only_with_leave(folders):
+    here, elsewhere = folders
+    write(elsewhere / "shades.tif", np.full((12, 10), 254, np.uint8))
+    virtual(here / "map.pgm", elsewhere / "shades.tif")
+    text = (here / "map.pgm").read_text().replace("Float64", "Byte")
+    (here / "map.pgm").write_text(text)
+    (here / "map.yaml").write_text("image: map.pgm\nresolution: 0.5\norigin: [0, 0, 0]\n")
+    with pytest.raises(tp.MapError, match="is elsewhere") as caught:
+        tp.read_surface(here / "map.yaml")
+    assert "--allow-external" in one_line(caught)
+    tp.read_surface(here / "map.yaml", allow_external=True)
 
 
 def test_virtual_rasters_that_name_each_other_are_refused(tmp_path):

@@ -8,25 +8,38 @@ from __future__ import annotations
 
 import os
 import re
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from xml.etree import ElementTree as Xml
+from typing import TYPE_CHECKING
 
 from ..errors import MapError
 from ..validation import is_there
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 ALLOW = "allow_external=True in Python, --allow-external on the command line"
 
 # Drivers of GDAL whose names have a file after the colon, and archives that are read like folders.
 _OF_FILES = ("netcdf", "hdf5", "hdf5image", "gpkg", "gtiff_dir", "bag", "zarr")
-_ARCHIVES = re.compile(r"(?:/vsi(?:zip|tar|gzip|7z|rar)/)+", re.IGNORECASE)
+# Only zip archives are looked into for descriptions, see ``require_moderate_archive``.
+_ARCHIVES = re.compile(r"(?:/vsizip/)+", re.IGNORECASE)
 _DRIVER = re.compile(r"([A-Za-z0-9_+]{2,}):(.*)", re.DOTALL)
 
 MOST_XML = 64 * 2**20  # bytes of a description
+BEGINNING = 1024  # bytes in which a description says what it is
 DEEPEST = 8  # descriptions in descriptions
-# Elements of virtual rasters and virtual vectors that name another file.
-_NAMING = {"sourcefilename", "sourcedataset", "srcdatasource", "indexdataset", "source"}
+
+# How text begins that says where the data are, instead of holding them: of services, or virtual.
+DESCRIBES = re.compile(
+    rb"<(?P<service>GDAL_W|WCS_GDAL|GDALTileIndex|OGRW|OGRC|MRF_META|ST_|NITF)"
+    rb"|(?P<command>gdal_streamed_alg)|<(?P<virtual>VRT|OGRVRT)"
+)
+_INLINE = re.compile(r"\s*[<{]|<(VRT|OGRVRT|GDAL)", re.IGNORECASE)
+# Elements, and attributes, of virtual rasters and virtual vectors that name another file.
+_NAMING = {"sourcefilename", "sourcedataset", "srcdatasource", "indexdataset", "source", "dempath"}
+# Entries by their keys: places of cells, and arguments of processing steps.
+_ENTRIES = re.compile(r"[xy]_dataset|.*filename.*", re.IGNORECASE)
 
 # An archive holds no more than this, and little that is packed more than so many times.
 MOST_UNPACKED = 4 * 2**30
@@ -55,7 +68,7 @@ def reaches_out(name: str, folder: Path) -> bool:
 
 def _paths_in(name: str) -> Iterator[str | None]:
     """The paths that a name may mean; None for what is no file of this machine."""
-    if "://" in name:
+    if "://" in name or _INLINE.search(name):
         yield None
     elif name.lower().startswith("/vsi"):
         rest = _ARCHIVES.sub("", name)
@@ -77,32 +90,44 @@ def require_no_reach(path: Path, beginning: bytes, *, depth: int = 0) -> None:
 
     beginning : its first bytes. Virtual rasters and vectors, and descriptions of services.
     """
+    found = DESCRIBES.search(beginning)
+    if found is None:
+        return
     if depth > DEEPEST:
         raise MapError(f"{path}: descriptions of data that name one another; name the data")
-    if re.search(rb"<(GDAL_W|WCS_GDAL|GDALTileIndex|ST_|NITF)", beginning):
+    if found["virtual"] is None:
         raise MapError(f"{path} describes a service elsewhere; allow that by {ALLOW}")
-    if re.search(rb"<(VRT|OGRVRT)", beginning):
-        _require_sources_inside(path, depth)
-
-
-def _require_sources_inside(path: Path, depth: int) -> None:
     for name, is_relative in _sources(path):
-        file = str(path.parent / name) if is_relative and not Path(name).is_absolute() else name
         if reaches_out(name, path.parent):
             raise MapError(
                 f"{path} takes its data from {name!r:.200}, which is elsewhere; allow "
                 f"that by {ALLOW}"
             )
+        file = _file_of(name, path.parent if is_relative else Path())
         try:
-            with Path(file).open("rb") as source:
-                beginning = source.read(1024) if Path(file).is_file() else b""
+            with file.open("rb") as source:
+                beginning = source.read(BEGINNING)
         except (OSError, ValueError):
-            continue
-        require_no_reach(Path(file), beginning, depth=depth + 1)
+            raise MapError(
+                f"{path} takes its data from {name!r:.200}, which is no file that can be looked "
+                f"into; check the name, or allow it by {ALLOW}"
+            ) from None
+        require_no_reach(file, beginning, depth=depth + 1)
+
+
+def _file_of(name: str, folder: Path) -> Path:
+    """The file that a name means, as seen from a folder; of a driver's name, the file in it."""
+    if _DRIVER.fullmatch(name):
+        for part in re.split(r'[:"]', name)[1:]:
+            if part and (folder / part).is_file():
+                return folder / part
+    return folder / name
 
 
 def _sources(path: Path) -> Iterator[tuple[str, bool]]:
     """The names in a description, and whether they are relative to its folder."""
+    from xml.etree import ElementTree as Xml
+
     try:
         if path.stat().st_size > MOST_XML:
             raise MapError(f"{path} is a description of over {MOST_XML:,} bytes; name the data")
@@ -113,29 +138,59 @@ def _sources(path: Path) -> Iterator[tuple[str, bool]]:
     except (Xml.ParseError, OSError, ValueError) as error:
         raise MapError(f"{path} cannot be read as XML: {error}; check the file") from None
     for element in root.iter():
-        tag = element.tag.rpartition("}")[2].lower()
-        if tag in _NAMING and element.text and element.text.strip():
-            given = {key.lower(): value for key, value in element.attrib.items()}
-            relative = given.get("relativetovrt", "0").strip().lower() in {"1", "yes", "true", "on"}
-            yield element.text.strip(), relative
-        elif tag == "openoptions":
-            continue
+        yield from _names_in(path, element)
+
+
+def _names_in(path: Path, element: Element) -> Iterator[tuple[str, bool]]:
+    """The names that one element gives: in its text, and in attributes, which GDAL reads alike."""
+    tag = element.tag.rpartition("}")[2].lower()
+    text = (element.text or "").strip()
+    given = {key.lower(): value.strip() for key, value in element.attrib.items()}
+    key = given.get("key", given.get("name", ""))
+    if tag == "srcsql" or "srcsql" in given:
+        raise MapError(
+            f"{path} takes its data from a query, which may name other files; name the file, or "
+            f"allow it by {ALLOW}"
+        )
+    if tag == "ooi" and re.search(r"[/\\<{]", text):
+        raise MapError(f"{path} opens a file with {key}={text!r:.200}; allow that by {ALLOW}")
+    is_entry = tag in {"mdi", "argument", "option"} and _ENTRIES.fullmatch(key)
+    relative = given.get("relativetovrt", "0").lower() in {"1", "yes", "true", "on"}
+    if text and (tag in _NAMING or is_entry):
+        yield text, relative
+    for name in _NAMING & given.keys():
+        yield given[name], relative
 
 
 # Archives
 
 
-def require_moderate_archive(path: Path) -> None:
-    """Raise MapError for a zip archive that is far larger unpacked than a map would be."""
+def require_moderate_archive(path: Path, *, allow_external: bool) -> None:
+    """Raise MapError for a zip archive that is far larger unpacked than a map would be.
+
+    And for one that holds descriptions of data, which may be elsewhere, without leave.
+    """
+    import zipfile
+    import zlib
+
     try:
         if not (path.is_file() and zipfile.is_zipfile(path)):
             return
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()
-        packed = path.stat().st_size
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+            _require_moderate(path, sum(entry.file_size for entry in entries))
+            for entry in [] if allow_external else entries:
+                with archive.open(entry) as file:
+                    _require_no_description(path, entry.filename, file.read(BEGINNING))
+    except (
+        OSError, EOFError, RuntimeError, zipfile.BadZipFile, ValueError, zlib.error
+    ) as error:  # fmt: skip
         raise MapError(f"{path} cannot be read: {error}") from None
-    size = sum(entry.file_size for entry in entries)
+
+
+def _require_moderate(path: Path, size: int) -> None:
+    """Raise MapError where an archive is too large unpacked. size : bytes."""
+    packed = path.stat().st_size
     if size > MOST_UNPACKED or size > max(SMALL, MOST_PACKED * packed):
         raise MapError(
             f"{path} holds {size / 2**30:,.3g} GiB in {packed / 2**20:,.3g} MiB, more than a map "
@@ -143,10 +198,16 @@ def require_moderate_archive(path: Path) -> None:
         )
 
 
+def _require_no_description(path: Path, name: str, beginning: bytes) -> None:
+    if DESCRIBES.search(beginning):
+        raise MapError(
+            f"{path} holds {name!r:.100}, which only says where the data are; unpack it, or allow "
+            f"it by {ALLOW}"
+        )
+
+
 def archive_of(name: str) -> Path | None:
     """The archive in a name such as /vsizip/maps.zip/dem.tif or zip://maps.zip!dem.tif."""
-    if "zip" not in name.lower():
-        return None
     text = re.sub(r"^(?:/vsizip/|zip\+?[a-z0-9]*://)", "", name, flags=re.IGNORECASE).strip("{}")
     for end in [m.end() for m in re.finditer(r"\.[A-Za-z0-9]+(?=[/!\\}]|$)", text)]:
         if is_there(path := Path(text[:end])) and path.is_file():

@@ -14,10 +14,11 @@ from rasterio.enums import ColorInterp
 from .._support.extras import require_packages
 from ..errors import MapError
 from ..surface.raster import Grid
-from ..validation import Array, is_there, require_no_pipe
+from ..validation import Array, is_there
 from .arrays import ArrayBand
 from .bands import Band
 from .rasters import gdal, open_dataset, reading
+from .sources import require_safe
 
 Cells = npt.NDArray[np.bool_]
 
@@ -65,7 +66,7 @@ def open_nav2(path: Path, number: int | str, *, allow_external: bool) -> Band:
     if not resolution > 0.0:
         raise MapError(f"{path}: resolution={resolution:g} must be above 0, metres a cell")
     x, y, yaw = _origin(path, about)
-    occupancy, unknown = _occupancy(path, about, *_shades(image))
+    occupancy, unknown = _occupancy(path, about, *_shades(image, allow_external))
     blocked = unknown | (occupancy >= OCCUPIED)
     transform = (
         Affine.translation(x, y)
@@ -112,9 +113,9 @@ def _origin(path: Path, about: dict[str, Any]) -> tuple[float, float, float]:
     return x, y, yaw
 
 
-def _shades(image: Path) -> tuple[Array, Array]:
+def _shades(image: Path, allow_external: bool) -> tuple[Array, Array]:
     """Brightness and opacity of a picture's cells, from 0 to 1."""
-    require_no_pipe(image)
+    require_safe(image, allow_external=allow_external)
     if not is_there(image):
         raise MapError(f"{image} does not exist; check 'image' in the map's YAML file")
     with gdal(), reading(image), open_dataset(image) as picture:

@@ -13,6 +13,13 @@ import numpy as np
 from pyproj import CRS
 from rasterio import Affine
 
+from .._support.external import (
+    BEGINNING,
+    DESCRIBES,
+    archive_of,
+    require_moderate_archive,
+    require_no_reach,
+)
 from ..errors import InputError, MapError, MapWarning, tell
 from ..surface.georeference import LENGTH_UNITS, metres_of, parse_crs
 from ..validation import Array, require_no_pipe, require_not_negative, require_positive
@@ -34,8 +41,6 @@ FORMS = {
     ".yaml": "nav2", ".yml": "nav2", ".map": "movingai", ".las": "las", ".laz": "las",
     ".ply": "ply", ".csv": "text", ".txt": "text", ".xyz": "text",
 }  # fmt: skip
-# How text begins that says where the data are, instead of holding them.
-DESCRIBES = re.compile(rb"<(VRT|OGRVRT|GDAL_W|WCS_GDAL|GDALTileIndex)")
 NETCDF_ENDINGS = (".nc", ".nc4", ".cdf", ".netcdf")
 
 _TEXT = re.compile(r"(?P<path>.+?)(?::(?P<band>\d+))?(?:\*(?P<weight>[^*]*))?", re.DOTALL)
@@ -150,8 +155,8 @@ def form_of(path: str | Path, beginning: bytes) -> str | None:
 def require_safe(name: str | Path, *, allow_external: bool) -> bytes:
     """The first bytes of a file, b"" where a name is of something else.
 
-    Raises MapError for a pipe, an archive that is too large, and a file that takes its data from
-    outside its folder without leave.
+    The one door that rasters, pictures and vectors go through. Raises MapError for a pipe, an
+    archive that is too large, and a file that takes its data from outside its folder without leave.
     """
     path = Path(name)
     require_no_pipe(path)
@@ -159,20 +164,17 @@ def require_safe(name: str | Path, *, allow_external: bool) -> bytes:
     if ":" in text:
         for part in re.split(r'[:"]', text):
             require_no_pipe(Path(part or "."))
-    if "zip" in text.lower():
-        from .._support.external import archive_of, require_moderate_archive
-
-        archive = archive_of(text)
-        if archive is not None:
-            require_moderate_archive(archive)
+    archive = archive_of(text) if "zip" in text.lower() else None
+    if archive is not None:
+        require_moderate_archive(archive, allow_external=allow_external)
     try:
         with path.open("rb") as file:
-            beginning = file.read(1024)
+            beginning = file.read(BEGINNING)
     except (OSError, ValueError):
         return b""
+    if beginning.startswith(b"PK") and path != archive:
+        require_moderate_archive(path, allow_external=allow_external)
     if DESCRIBES.search(beginning) and not allow_external:
-        from .._support.external import require_no_reach
-
         require_no_reach(path, beginning)
     return beginning
 

@@ -16,7 +16,8 @@ from shapely.geometry.base import BaseGeometry
 from ..._support.extras import require_packages
 from ...errors import MapError, RepairedWarning, VectorWarning, silence, tell
 from ...space.free_space import Geometries, Indices, simple_parts
-from ...validation import is_there, require_no_pipe
+from ...validation import is_there
+from ..sources import require_safe
 
 FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30
@@ -41,7 +42,8 @@ def read_layers(path: Path, *, allow_external: bool = False) -> Iterator[Layer]:
     allow_external : the file may take its data from outside its folder.
     """
     source, wanted = _found(path)
-    _require_safe(source, allow_external=allow_external)
+    _refuse_absurd_sizes(source)
+    require_safe(source, allow_external=allow_external)
     require_packages(f"reading {source}", "pyogrio")
     names, count = _listed(source, wanted)
     data = _content(source)
@@ -64,19 +66,6 @@ def _found(path: Path) -> tuple[Path, str]:
     if not file or not is_there(Path(file)):
         raise MapError(f"{path} does not exist; check the path")
     return Path(file), wanted
-
-
-def _require_safe(source: Path, *, allow_external: bool) -> None:
-    """Raise MapError for a pipe, what is too large, and what reaches outside without leave."""
-    require_no_pipe(source)
-    _refuse_absurd_sizes(source)
-    if allow_external or not source.is_file():
-        return
-    from ..._support.external import require_no_reach
-
-    with quietly(source), source.open("rb") as file:
-        beginning = file.read(1024)
-    require_no_reach(source, beginning)
 
 
 def _content(source: Path) -> Path | bytes:
@@ -115,12 +104,7 @@ def _count(data: Path | bytes, source: Path, layer: str) -> int:
 
 
 def _refuse_absurd_sizes(path: Path) -> None:
-    """Raise MapError for a file that is too large, before memory is allocated.
-
-    A zip archive counts with its unpacked size.
-    """
-    from ..._support.external import require_moderate_archive
-
+    """Raise MapError for a file that is too large, before memory is allocated."""
     try:
         files = [p for p in path.glob("*") if p.is_file()] if path.is_dir() else [path]
         size = sum(file.stat().st_size for file in files)
@@ -131,7 +115,6 @@ def _refuse_absurd_sizes(path: Path) -> None:
             f"{path} holds {size / 2**30:,.1f} GiB, more than {MOST_BYTES / 2**30:g} GiB; "
             "cut out the part around the map"
         )
-    require_moderate_archive(path)
 
 
 @contextmanager
