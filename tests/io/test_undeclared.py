@@ -1,6 +1,7 @@
 """Fills that no tag declares are found and blocked; ground that looks like one is not."""
 
 import re
+import warnings
 from contextlib import ExitStack
 
 import numpy as np
@@ -32,7 +33,7 @@ def view_of(values):
 def blocked(values):
     """(ny, nx): what counts as no data."""
     with collecting():
-        read = Fills("auto").blocked(view_of(values), heights=True)
+        read = Fills("auto").blocked(view_of(values), "heights")
     return ~np.isfinite(read.band.read(slice(0, SIDE), slice(0, SIDE)))
 
 
@@ -40,7 +41,7 @@ def blocked(values):
 def test_real_ground_is_not_taken_for_a_fill(name):
     for seed in range(4):
         ground = GROUNDS[name](np.random.default_rng([seed, 1]), SIDE)
-        assert findings(view_of(ground), heights=True) == [], seed
+        assert findings(view_of(ground), "heights") == [], seed
 
 
 @pytest.mark.parametrize("name", GROUNDS)
@@ -152,6 +153,37 @@ def test_layers_are_searched_too(tmp_path):
     with pytest.warns(tp.MapWarning, match=r"rocks\.tif: 1 cell holds -9999"):
         surface = tp.read_surface(write(tmp_path / "dem.tif", HEIGHTS), layers={"rocks": layer})
     assert surface.nodata.blocked.sum() == 1
+
+
+DEAR = [999.0, 9999.0, 32767.0, 65535.0, 99999.0, 2147483647.0, 4294967295.0, 1e11]
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("value", DEAR)
+def test_a_dear_cost_is_a_cost(tmp_path, value, smooth):
+    costs = np.ones((12, 10))
+    costs[3:6, 4:7] = value
+    layer = write(tmp_path / "going.tif", costs)
+    dem = write(tmp_path / "dem.tif", HEIGHTS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        surface = tp.read_surface(dem, costs={"going": layer}, smooth_costs=smooth)
+    assert surface.nodata is None
+    start, goal = (500015.0, 4000015.0), (500055.0, 4000075.0)  # in the dear cells
+    assert tp.plan(tp.Problem(surface, start, goal), "dijkstra").path is not None
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("value", [-9999.0, -32768.0, -99999.0, -3.4e38, 3.4e38, 1e30])
+@pytest.mark.parametrize("dear", [3.0, 65535.0])
+def test_what_no_cost_can_be_is_no_data(tmp_path, value, smooth, dear):
+    costs = np.random.default_rng(0).choice([1.0, dear], (12, 10))
+    costs[3:6, 4:7] = value
+    layer = write(tmp_path / "going.tif", costs)
+    dem = write(tmp_path / "dem.tif", HEIGHTS)
+    with pytest.warns(tp.MapWarning, match=r"going\.tif: 9 cells hold .* as no cost can be"):
+        surface = tp.read_surface(dem, costs={"going": layer}, smooth_costs=smooth)
+    assert surface.nodata.blocked.sum() == 9
 
 
 def test_a_map_of_nothing_but_fills_holds_no_data(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pyproj import CRS
@@ -16,6 +17,9 @@ from ..surface.raster import Grid
 from ..surface.resampling import require_overlap, resample
 from ..validation import Array
 from .bands import Band, Part, View
+
+if TYPE_CHECKING:
+    from .undeclared import Meaning
 
 
 def placed(name: str, band: Band, base: Grid, crs: CRS | None) -> Band:
@@ -42,7 +46,7 @@ def read_all(
     base: View,
     target: Grid,
     most_cells: int,
-    without_fills: Callable[[View], View],
+    without_fills: Callable[[View, Meaning], View],
 ) -> Array:
     """All layers (layers, rows, columns) on the cells of the target.
 
@@ -53,7 +57,8 @@ def read_all(
     views = [base, *(_view_onto(part, base, target) for part in parts[1:])]
     for view in views:
         view.require_size(most_cells)
-    views[1:] = map(without_fills, views[1:])
+    meanings: list[Meaning] = ["layer" if p.kind == "rise" else "costs" for p in parts[1:]]
+    views[1:] = map(without_fills, views[1:], meanings)
     bands = np.empty((len(parts), target.rows, target.columns))
     for part, view, out in zip(parts, views, bands, strict=True):
         if part.kind == "cost":
@@ -103,7 +108,7 @@ def own_cells(
     base: View,
     target: Grid,
     most_cells: int,
-    without_fills: Callable[[View], View],
+    without_fills: Callable[[View, Meaning], View],
 ) -> CellLayers | None:
     """The costs of the cells of a raster whose cells are not those of the heights.
 
@@ -119,7 +124,7 @@ def own_cells(
     if not all(part.band.grid.is_same(grid) for part in cells[1:]):
         return None
     views = [View.whole(part.band).around(*target.outline(None)) for part in cells]
-    found = [without_fills(view) for view in views if view is not None]
+    found = [without_fills(view, "costs") for view in views if view is not None]
     values = []
     for view in found:
         view.require_size(most_cells)

@@ -25,7 +25,7 @@ from .sources import LayerSource, NoData, Source, Unsaid
 if TYPE_CHECKING:
     from ..surface.costs import CellLayers
     from ..surface.layers import Kind
-    from .undeclared import Fills
+    from .undeclared import Fills, Meaning
 
 # x_min, y_min, x_max, y_max in the map's own coordinates.
 Rectangle: TypeAlias = tuple[float, float, float, float]
@@ -56,12 +56,12 @@ class OpenMap:
 
         return Fills(self.unsaid.no_data)
 
-    def _without_fills(self, view: View, *, heights: bool = False) -> View:
+    def _without_fills(self, view: View, meaning: Meaning) -> View:
         """The view, with what is no data without being declared as such."""
         is_searched = self.unsaid.no_data == "auto"
         if is_searched and view.looks_usual():
             return view
-        return self._fills.blocked(view, heights=heights)
+        return self._fills.blocked(view, meaning)
 
     def _require_open(self) -> None:
         if self.is_closed:
@@ -90,7 +90,7 @@ class OpenMap:
         base.require_size(most_cells)
         # Heights of damaged files may overflow. They are refused later, or become no-data.
         with gdal(), np.errstate(over="ignore", invalid="ignore"):
-            base = self._without_fills(base, heights=True)
+            base = self._without_fills(base, "heights")
             target = base.grid.southward() if base.grid.is_upright else base.grid
             bands = self._read(base, target, most_cells)
             cells = self._own_cells(base, target, most_cells)

@@ -8,7 +8,7 @@ the sea floor passes through -9999 on a slope.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,8 @@ from .bands import DEPTH, USUAL, Band, View
 from .sources import NoData
 
 Cells: TypeAlias = npt.NDArray[np.bool_]
+# What the values of a band are.
+Meaning: TypeAlias = Literal["heights", "layer", "costs"]
 
 # Values that programs write for no data.
 KNOWN = np.array([
@@ -28,6 +30,8 @@ KNOWN = np.array([
     9999, 99999, 999999, 32767, 65535, 2147483647, 4294967295,
 ])  # fmt: skip
 HUGE = 1e9  # no height has this magnitude, in any unit
+# From these magnitudes on, a value means no data. Costs may be dear: 9999 or 65535 is one.
+BEYOND: dict[Meaning, float] = {"heights": HUGE, "layer": np.inf, "costs": 1e30}
 CLIFFS = 5.0  # a fill's cliffs are this many times as high as 99 % of the steps elsewhere
 # A flat plain of any other value is a fill if it lies so far below everything else (DEPTH), and its
 # cliffs are this many times the steps elsewhere and this steep on all sides.
@@ -98,19 +102,19 @@ class Fills:
     no_data: NoData
     found: dict[int, list[Finding]] = field(default_factory=dict)
 
-    def blocked(self, view: View, *, heights: bool) -> View:
+    def blocked(self, view: View, meaning: Meaning) -> View:
         """The view, with what is no data without being declared as such; it is told of."""
         if self.no_data == "none":
             return view
         if self.no_data != "auto":
             # Said of the heights alone: 0 may be no height, and yet a slope or a temperature.
-            ranges = [of_value(self.no_data)] if heights else []
+            ranges = [of_value(self.no_data)] if meaning == "heights" else []
             return replace(view, band=without(view.band, *ranges))
         key = id(view.band)  # the map keeps its bands
         if key not in self.found:
-            found = findings(view, heights=heights)
+            found = findings(view, meaning)
             for finding in found:
-                tell(MapWarning(_in_words(view, finding)))
+                tell(MapWarning(_in_words(view, finding, meaning)))
             if not view.is_whole:
                 return _freed(view, found)
             self.found[key] = found
@@ -121,7 +125,7 @@ def _freed(view: View, found: list[Finding]) -> View:
     return replace(view, band=without(view.band, *((f.low, f.high) for f in found)))
 
 
-def _in_words(view: View, found: Finding) -> str:
+def _in_words(view: View, found: Finding, meaning: Meaning) -> str:
     x, y = view.band.grid.place(
         view.columns.start + found.column + 0.5, view.rows.start + found.row + 0.5
     )
@@ -129,36 +133,39 @@ def _in_words(view: View, found: Finding) -> str:
     if found.low != found.high and abs(found.value) < HUGE:
         between = f", or lie between that and {found.high + found.low - found.value:.6g},"
     cells = f"{found.cells:,} cell{'s hold' if found.cells > 1 else ' holds'}"
+    does, remedy = (
+        "no ground does",
+        (
+            f"say so by --nodata {found.value:.10g}, or --nodata none if it is ground "
+            "(nodata= in Python)"
+        ),
+    )
+    if meaning == "costs":
+        does, remedy = "no cost can be", "declare it as no-data in the file"
     return (
-        f"{view.band.label}: {cells} {found.value:.10g}{between} as no ground does, though no tag "
-        f"declares it as no-data, the first at x={x:.10g}, y={y:.10g}; they are blocked; say so "
-        f"by --nodata {found.value:.10g}, or --nodata none if it is ground (nodata= in Python)"
+        f"{view.band.label}: {cells} {found.value:.10g}{between} as {does}, though no tag "
+        f"declares it as no-data, the first at x={x:.10g}, y={y:.10g}; they are blocked; {remedy}"
     )
 
 
 # The search
 
 
-def findings(view: View, *, heights: bool) -> list[Finding]:
+def findings(view: View, meaning: Meaning) -> list[Finding]:
     """The values in the part of a band that are no data, though nothing says so.
 
-    heights : other values than the known ones are looked for only in heights.
+    Other values than the known ones are looked for only in heights, and in costs only those that
+    no cost can be: negative, or beyond all costs.
     """
     whole = replace(view, factor=1)
-    seen = _Seen(*view.band.scaling)
+    seen = _Seen(*view.band.scaling, meaning)
     for start, strip in whole.strips():
-        seen.add(start, strip, heights=heights)
-    found = []
-    if heights and 0 < seen.huge < seen.known:
-        row, column = seen.first_huge
-        for low, high in ((-np.inf, -HUGE), (HUGE, np.inf)):
-            cells, value = seen.beyond[low > 0]
-            if cells:
-                found.append(Finding(low, high, value, cells, row, column))
+        seen.add(start, strip)
+    found = seen.findings_beyond()
     candidates = sorted(seen.suspects)
-    plain = seen.plain(view.band) if heights else None
+    plain = seen.plain(view.band) if meaning == "heights" else None
     for value in [*candidates, *([] if plain is None else [plain])]:
-        borders = _Borders(value, [v for v in candidates if v != value], heights)
+        borders = _Borders(value, [v for v in candidates if v != value], meaning)
         for start, strip in whole.strips():
             borders.add(start, strip)
         finding = borders.finding(PLAIN_CLIFFS if value == plain else CLIFFS)
@@ -170,9 +177,12 @@ def findings(view: View, *, heights: bool) -> list[Finding]:
 class _Seen:
     """What a first look at all values remembers."""
 
-    def __init__(self, scale: float, offset: float) -> None:
+    def __init__(self, scale: float, offset: float, meaning: Meaning) -> None:
         # Fills are stored as they are, and what is read is scaled.
         self.fills = np.unique(np.concatenate([KNOWN, KNOWN * scale + offset]))
+        if meaning == "costs":
+            self.fills = self.fills[self.fills < 0.0]
+        self.is_heights, self.most = meaning == "heights", BEYOND[meaning]
         self.usual = USUAL if (scale, offset) == (1.0, 0.0) else (np.inf, -np.inf)
         self.suspects: set[float] = set()
         self.known = self.huge = 0
@@ -180,34 +190,42 @@ class _Seen:
         self.beyond = [(0, 0.0), (0, 0.0)]  # cells and a value, far below and far above
         self.lowest, self.count, self.second = np.inf, 0, np.inf
 
-    def add(self, start: int, strip: Array, *, heights: bool) -> None:
+    def add(self, start: int, strip: Array) -> None:
         """Look at a strip of rows."""
         values = strip[np.isfinite(strip)]
         self.known += values.size
         if not values.size:
             return
         low, high = float(values.min()), float(values.max())
-        if heights and (low <= -HUGE or high >= HUGE):
+        if low <= -self.most or high >= self.most:
             self._add_huge(start, strip, values)
-            values = values[np.abs(values) < HUGE]
+            values = values[np.abs(values) < self.most]
         if low < self.usual[0] or high > self.usual[1]:
             far = values[(values < self.usual[0]) | (values > self.usual[1])]
             here = self.fills[np.isin(self.fills, far)]
             self.suspects.update(here.tolist())
             if len(here):
                 values = values[~np.isin(values, here)]
-        if heights and values.size:
+        if self.is_heights and values.size:
             self._add_lowest(values)
 
     def _add_huge(self, start: int, strip: Array, values: Array) -> None:
         if not self.huge:
-            row, column = np.argwhere(np.abs(np.nan_to_num(strip, posinf=0, neginf=0)) >= HUGE)[0]
+            held = np.abs(np.nan_to_num(strip, posinf=0, neginf=0)) >= self.most
+            row, column = np.argwhere(held)[0]
             self.first_huge = start + int(row), int(column)
-        for side, far in enumerate((values[values <= -HUGE], values[values >= HUGE])):
+        for side, far in enumerate((values[values <= -self.most], values[values >= self.most])):
             if far.size:
                 cells, value = self.beyond[side]
                 self.beyond[side] = cells + far.size, value if cells else float(far[0])
                 self.huge += far.size
+
+    def findings_beyond(self) -> list[Finding]:
+        """The values beyond all that are meant, unless the map holds nothing else."""
+        if not 0 < self.huge < self.known:
+            return []
+        sides = zip(((-np.inf, -self.most), (self.most, np.inf)), self.beyond, strict=True)
+        return [Finding(*side, value, n, *self.first_huge) for side, (n, value) in sides if n]
 
     def _add_lowest(self, values: Array) -> None:
         low = float(values.min())
@@ -237,8 +255,8 @@ class _Seen:
 class _Borders:
     """The cliffs around the cells of a value, and the steps of the ground elsewhere."""
 
-    def __init__(self, value: float, others: list[float], heights: bool) -> None:
-        self.value, self.others, self.heights = value, np.array(others), heights
+    def __init__(self, value: float, others: list[float], meaning: Meaning) -> None:
+        self.value, self.others, self.meaning = value, np.array(others), meaning
         self.jumps: list[Array] = []  # at the cells' borders
         self.steps: list[Array] = []  # elsewhere, and away from the cells
         self.steps_away: list[Array] = []
@@ -252,8 +270,7 @@ class _Borders:
         values = strip.copy()
         if self.others.size:
             values[np.isin(values, self.others)] = np.nan
-        if self.heights:
-            values[np.abs(values) >= HUGE] = np.nan
+        values[np.abs(values) >= BEYOND[self.meaning]] = np.nan
         held = values == self.value
         if held.any():
             if not self.cells:
@@ -289,7 +306,8 @@ class _Borders:
         usual = float(np.percentile(steps, 99.0)) if len(steps) else 0.0
         jump = float(np.median(jumps)) if len(jumps) else self.nearest
         is_apart = self.nearest > self.far[1] - self.far[0] >= 0.0
-        if not self.cells or not (jump > cliffs * usual or is_apart):
+        is_certain = self.meaning == "costs" or jump > cliffs * usual or is_apart
+        if not self.cells or not is_certain:
             return None
         if not len(jumps) and not np.isfinite(self.nearest) and self.value > 0.0:
             return None  # the whole map is as high as this
