@@ -30,7 +30,7 @@ def random_bound(random):
     cone = np.hypot(column * dx - 3.0, row[:, None] * dy + 2.0)
     rough = random.choice([0.01, 0.3, 3.0])
     coefficients = cone + rough * random.normal(size=(ny + 2, nx + 2))
-    return Potential(coefficients, 0.0, 0.0, dx, dy)
+    return Potential(coefficients, 0.0, 0.0, dx, dy, False)
 
 
 def random_box(random, bound, surface):
@@ -95,7 +95,7 @@ def test_the_facts_of_a_box_hold_on_needles(falloff):
     width = 1.0 / math.sqrt(2.0 * falloff)
     goal = oracles.Terrain(surface).lift(np.array([[5.2, 4.9]]))[0]
     for scale in (30.0, 3.0, 0.3, 0.03):
-        bound = Potential(4.0 + random.normal(size=(4, 4)), 4.0, 4.0, 2.0, 2.0)
+        bound = Potential(4.0 + random.normal(size=(4, 4)), 4.0, 4.0, 2.0, 2.0, False)
         place = 5.0 + width * random.uniform(-2.0, 2.0, 2)
         half = min(scale * width, 0.4)
         box = surface_models.Box(*np.clip(place, 4.4, 5.6), half, half)
@@ -284,7 +284,7 @@ def test_what_overflows_proves_nothing():
     assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 3.0, 0.0), 3.0).proven == 0.0
     assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 2.0, 1.0), 3.0).proven == 1.0
     surface = tp.Surface.from_peaks([[(1e-145, 1e307, 0.5, 0.5)]]).data
-    bound = Potential(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0)
+    bound = Potential(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0, False)
     box = surface_models.Box(0.5, 0.5, 0.5, 0.5)
     anchor = kernels.Anchor(np.ones(3), 1.0, math.inf)
     assert kernels.margin_of_box(surface, bound, anchor, 1.0, 0, 0, box) == -math.inf

@@ -9,12 +9,7 @@ import math
 
 from ..compiler import inner_kernel, kernel
 from ..surface.cells import least_inside
-
-
-@inner_kernel
-def slope_of(u, i, j, right, upper):
-    """The slope of the triangle of cell (i, j) whose corner is right, upper or neither."""
-    return u[j + upper, i + 1] - u[j + upper, i], u[j + 1, i + right] - u[j, i + right]
+from .potentials import slope_of
 
 
 @inner_kernel

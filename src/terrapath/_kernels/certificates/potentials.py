@@ -23,7 +23,7 @@ class Potential(NamedTuple):
     y0: float
     dx: float
     dy: float
-    is_linear: bool = False
+    is_linear: bool
 
 
 class Parts(NamedTuple):
@@ -48,11 +48,20 @@ def share_of_cell(share, half):
 
 
 @inner_kernel
+def slope_of(values, i, j, right, upper):
+    """The slope, per side, of a triangle of the cell whose lower left node is (i, j).
+
+    Its sides along the axes meet in the corner that is right, upper, both or neither: 1 or 0 each.
+    """
+    east = values[j + upper, i + 1] - values[j + upper, i]
+    return east, values[j + 1, i + right] - values[j, i + right]
+
+
+@inner_kernel
 def steepness(potential, i, j, right, upper):
-    """The square of the slope of the triangle with the corner that is right, upper or neither."""
-    c = potential.coefficients
-    east = (c[j + 1 + upper, i + 2] - c[j + 1 + upper, i + 1]) / potential.dx
-    north = (c[j + 2, i + 1 + right] - c[j + 1, i + 1 + right]) / potential.dy
+    """The square of the slope of such a triangle of cell (i, j)."""
+    x, y = slope_of(potential.coefficients, i + 1, j + 1, right, upper)
+    east, north = x / potential.dx, y / potential.dy
     return east * east + north * north
 
 
@@ -86,8 +95,8 @@ def plane_over(potential, i, j, box, part):
     upper = part
     right = 1 - part if rises_along_diagonal(potential, i, j) else part
     corner = c[j + 1 + upper, i + 1 + right]
-    east = (c[j + 1 + upper, i + 2] - c[j + 1 + upper, i + 1]) / potential.dx
-    north = (c[j + 2, i + 1 + right] - c[j + 1, i + 1 + right]) / potential.dy
+    rise_x, rise_y = slope_of(c, i + 1, j + 1, right, upper)
+    east, north = rise_x / potential.dx, rise_y / potential.dy
     x = potential.x0 + (i + right) * potential.dx
     y = potential.y0 + (j + upper) * potential.dy
     value = corner + east * (box.x - x) + north * (box.y - y)
