@@ -22,7 +22,7 @@ from ..problem import Path, Problem
 from ..surface import Surface
 from ..surface.metric import segment_lengths
 from ..validation import Array
-from .snell import obeying_snell
+from .snell import ON_SIDE, obeying_snell
 
 Integers = npt.NDArray[np.int64]
 
@@ -46,9 +46,6 @@ BESIDE = 2
 # On hills the path between two sides is not quite straight: cells are cut into parts of at most
 # this share of a feature of the ground.
 FEATURES_PER_PART = 0.5
-
-# Places this near to a side lie on it, as a share of the side.
-ON_SIDE = 1e-9
 
 # A bend is left out where that lengthens the path by no more than this share of it.
 STRAIGHT = 1e-12

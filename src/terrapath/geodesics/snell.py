@@ -21,7 +21,9 @@ FARTHEST = 3.0
 MOST_STEPS, MOST_HALVINGS = 20, 8
 # It ends where a step shortens the path by no more than this share.
 GAIN = 1e-14
-# Places this near to a side lie on it, as a share of the side.
+# Places this near to a side lie on it, as a share of the side. Bends are put on sides to rounding,
+# so this is narrower than the kernels' ``ON_SIDE``, by which costs are read: a bend that may move
+# along a side has the lower cost there.
 ON_SIDE = 1e-9
 
 

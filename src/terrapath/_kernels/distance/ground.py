@@ -17,7 +17,7 @@ import numpy as np
 
 from ..compiler import inner_kernel
 from ..dispatch import per_class
-from ..surface.cells import CostCells, any_cells, mean_in_cells
+from ..surface.cells import CostCells, any_cells, clamped, mean_in_cells
 from ..vec4 import any_above, four, four_entries, larger, sqrt, where_above
 
 
@@ -210,17 +210,12 @@ def times_cells(ground, cost, x0, y0, x2, y2):
 
 
 @inner_kernel
-def clamp(k, count):
-    return min(max(k, 0), count - 1)
-
-
-@inner_kernel
 def sampled_piece(ground, i, j, ex, ey):
     """The cost of the piece from sample (i, j) to (i, j) + 2 e, e in samples."""
     rows, columns = ground.heights.shape[1], ground.heights.shape[2]
     i1, j1, i2, j2 = i + ex, j + ey, i + 2 * ex, j + 2 * ey
-    il, ir = clamp(i1 + ey, columns), clamp(i1 - ey, columns)
-    jl, jr = clamp(j1 - ex, rows), clamp(j1 + ex, rows)
+    il, ir = clamped(i1 + ey, columns), clamped(i1 - ey, columns)
+    jl, jr = clamped(j1 - ex, rows), clamped(j1 + ex, rows)
     lift = flat(
         zero(ground),
         2.0 * ex * ground.dx,

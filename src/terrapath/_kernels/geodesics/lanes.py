@@ -52,7 +52,7 @@ def pair(surface, x, y, vx, vy, share):
 
 
 @kernel
-def smooth_length(surface, frame, ax, ay, bx, by):
+def gauss_length(surface, frame, ax, ay, bx, by):
     """The length of a segment by Gauss's rule of five points, in equal panels."""
     across = max(abs(bx - ax) / frame.longest_x, abs(by - ay) / frame.longest_y)
     panels = max(math.ceil(across), 1)
@@ -67,16 +67,16 @@ def smooth_length(surface, frame, ax, ay, bx, by):
 
 
 @kernel
-def piece_length(surface, frame, ax, ay, bx, by):
+def lane_length(surface, frame, ax, ay, bx, by):
     """The length of a segment; where costs are constant in cells, each cell has its own."""
     if not has_cells(surface):
-        return smooth_length(surface, frame, ax, ay, bx, by)
+        return gauss_length(surface, frame, ax, ay, bx, by)
     dx, dy = bx - ax, by - ay
     total, share = 0.0, 0.0
     while share < 1.0:
         here = stretch_at(surface, ax, ay, dx, dy, share)
         x0, y0, x1, y1 = ax + share * dx, ay + share * dy, ax + here.end * dx, ay + here.end * dy
-        total += here.cost * smooth_length(surface, frame, x0, y0, x1, y1)
+        total += here.cost * gauss_length(surface, frame, x0, y0, x1, y1)
         share = here.end
     return total
 
@@ -119,7 +119,7 @@ def measure(surface, space, frame, places, m, table):
             table[m, i, j] = math.inf
             exists = not (math.isnan(ax) or math.isnan(bx))
             if exists and segment_is_free(space, ax, ay, bx, by):
-                table[m, i, j] = piece_length(surface, frame, ax, ay, bx, by)
+                table[m, i, j] = lane_length(surface, frame, ax, ay, bx, by)
 
 
 @kernel
