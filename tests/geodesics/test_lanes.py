@@ -91,13 +91,13 @@ def refined(problem, path):
     return found, [warning for warning in said if warning.category is UnfinishedWarning]
 
 
-@pytest.mark.parametrize("seed", mostly_slow(range(2, 42), quick=4))
+# Maps 7 and 38 have no path.
+@pytest.mark.parametrize("seed", mostly_slow(sorted({*range(2, 44)} - {7, 38}), quick=4))
 def test_on_rough_ground_a_path_becomes_shorter_and_stays_free(seed):
     made = random_map(seed)
     problem = made.problem()
     path = tp.Dijkstra(neighbours=16).solve(problem).path
-    if path is None:
-        return
+    assert path is not None
     found, _ = refined(problem, path)
     ground = made.own_ground(problem.surface)
     assert judges.touches(made.walls(problem.constraints.steep), found.points) is None

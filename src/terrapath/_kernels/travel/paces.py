@@ -106,25 +106,6 @@ def intercept_at(pace, slope):
     return min(pace_at(pace, low) - slope * low, pace_at(pace, high) - slope * high)
 
 
-@inner_kernel
-def lower_intercept_at(pace, slope):
-    """A number just below A(B), from the lines: quick, and safe where a bound is proven.
-
-    A is concave, so between two lines it lies above the straight one. The difference is at most
-    about what the lines lack of P. Minus infinity beyond the outermost lines.
-    """
-    slopes, intercepts = pace.slopes, pace.intercepts
-    last = len(slopes) - 1
-    if slope < slopes[0] or slope > slopes[last]:
-        return -np.inf
-    above = min(np.searchsorted(slopes, slope, side="right"), last)
-    below = max(above - 1, 0)
-    if below == above:
-        return intercepts[above]
-    share = (slope - slopes[below]) / (slopes[above] - slopes[below])
-    return intercepts[below] + share * (intercepts[above] - intercepts[below])
-
-
 @kernel
 def evaluate_paces(pace, grades, values):
     """Write P at grades (n,) to values (n,)."""
@@ -145,10 +126,3 @@ def evaluate_intercepts(pace, slopes, values):
     """Write A(B) at slopes (n,) to values (n,)."""
     for i in range(len(slopes)):
         values[i] = intercept_at(pace, slopes[i])
-
-
-@kernel
-def evaluate_lower_intercepts(pace, slopes, values):
-    """Write what ``lower_intercept_at`` says of slopes (n,) to values (n,)."""
-    for i in range(len(slopes)):
-        values[i] = lower_intercept_at(pace, slopes[i])
