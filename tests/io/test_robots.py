@@ -1,6 +1,7 @@
 """Maps of robots and games, heightmaps, and scattered points."""
 
 import json
+import warnings
 
 import laspy
 import numpy as np
@@ -282,3 +283,26 @@ def test_a_damaged_laz_file_does_not_abort_the_process(tmp_path):
     path.write_bytes(content)
     with pytest.raises(tp.MapError, match="chunks"):
         tp.read_surface(path)
+
+
+# How many cells
+
+
+def test_maps_that_are_read_as_a_whole_have_as_many_cells_as_the_caller_allows(
+    tmp_path, monkeypatch
+):
+    write_cloud(tmp_path / "cloud.csv", cloud(400))
+    maps = [nav2(tmp_path, yard()), movingai(tmp_path, ["....."] * 5), tmp_path / "cloud.csv"]
+    for module in ("occupancy", "points"):
+        # Refused before any cell is made.
+        monkeypatch.setattr(f"terrapath.io.{module}.ArrayBand", None)
+    for path in maps:
+        with pytest.raises(tp.MapError, match="cells, more than 24;") as caught:
+            tp.read_surface(path, most_cells=24)
+        assert "most_cells" in one_line(caught)
+    monkeypatch.undo()
+    monkeypatch.setattr("terrapath.io.maps.MOST_CELLS", 24)
+    for path in maps:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", tp.MapWarning)
+            assert tp.read_surface(path, most_cells=10_000).bounds is not None

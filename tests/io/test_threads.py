@@ -177,7 +177,6 @@ def test_maps_are_read_in_threads_as_in_one(maps):
 
 def test_an_open_map_reads_what_maps_opened_anew_read(maps):
     from terrapath.io import open_map
-    from terrapath.io.maps import count_cells
 
     for options in (maps["layers"], maps["degrees"], maps["netcdf"], maps["classic netcdf"]):
         given = {key: value for key, value in options.items() if key != "source"}
@@ -188,8 +187,7 @@ def test_an_open_map_reads_what_maps_opened_anew_read(maps):
             west, south, east, north = 10.01, 45.97, 10.03, 45.99
         window = (west, south, east, north)
         with open_map(options["source"], **given) as opened:
-            assert opened.cells() == SIDE * SIDE == count_cells(options["source"])
-            assert opened.cells(window) == count_cells(options["source"], within=window)
+            assert opened.cells() == SIDE * SIDE
             assert opened.cells(window) < SIDE * SIDE
             for asked in ({}, {"decimate": 2}, {"within": window, "margin": 50.0}, {}):
                 expected = bits(tp.read_surface(**options, **asked))

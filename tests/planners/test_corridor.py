@@ -11,7 +11,7 @@ from rasterio import Affine
 import terrapath as tp
 from terrapath.cli.main import run
 from terrapath.errors import InputError
-from terrapath.io.maps import count_cells
+from terrapath.io import open_map
 from terrapath.planners import corridor, make_finished
 from terrapath.planners.corridor import Corridor, Part, factor, plan_in_corridor
 from terrapath.scenario import answers
@@ -181,8 +181,9 @@ DEGREES = Affine(1e-4, 0.0, 15.0, 0.0, -1e-4, 45.03)
 
 def test_cells_are_counted_from_the_header(tmp_path):
     path = write_map(tmp_path / "map.tif", "EPSG:32633", UTM)
-    assert count_cells(path) == COUNT**2
-    part = count_cells(path, within=(500_000.0, 5_000_000.0, 501_000.0, 5_001_000.0))
+    with open_map(path) as opened:
+        assert opened.cells() == COUNT**2
+        part = opened.cells((500_000.0, 5_000_000.0, 501_000.0, 5_001_000.0))
     assert 100**2 <= part <= 120**2
 
 

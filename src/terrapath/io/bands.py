@@ -28,6 +28,18 @@ MOST_LOOKED_AT = 1_000_000  # heights that are searched for the rounding step
 # dismissed at a glance, and other fills lie at least so far below the ground, metres.
 USUAL, DEPTH = (-998.0, 9998.0), 300.0
 
+MOST_CELLS = 150_000_000  # of a map, where nothing else is said; 1.2 GB for each layer
+FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
+
+
+def require_few_cells(label: str, rows: int, columns: int, most: int) -> None:
+    """Raise MapError where a map that is read as a whole has too many cells."""
+    if rows * columns > most:
+        raise MapError(
+            f"{label} has {columns:,} x {rows:,} cells, more than {most:,}; give larger cells "
+            "(points take them by --cell-size), or raise most_cells= in Python"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Band(ABC):

@@ -15,19 +15,19 @@ from .sources import Unsaid
 def _nav2(path: Path, number: int | str, unsaid: Unsaid) -> Band:
     from .occupancy import open_nav2
 
-    return open_nav2(path, number, allow_external=unsaid.allow_external)
+    return open_nav2(path, number, unsaid)
 
 
-def _movingai(path: Path, number: int | str, _: Unsaid) -> Band:
+def _movingai(path: Path, number: int | str, unsaid: Unsaid) -> Band:
     from .occupancy import open_movingai
 
-    return open_movingai(path, number)
+    return open_movingai(path, number, unsaid.most_cells)
 
 
 def _points(read: str, path: Path, number: int | str, unsaid: Unsaid) -> Band:
     from .points import open_points
 
-    return open_points(path, number, unsaid.crs, unsaid.cell_size, read)
+    return open_points(path, number, unsaid, read)
 
 
 # By the names that ``sources.FORMS`` gives to endings.

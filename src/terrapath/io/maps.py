@@ -18,7 +18,7 @@ from ..surface.bounds import as_bounds
 from ..surface.georeference import Georeference, metres_of
 from ..surface.raster import Grid, Raster
 from ..validation import Array, require_count, require_not_negative
-from .bands import Band, Part, View, quantisation_step
+from .bands import MOST_CELLS, Band, Part, View, quantisation_step
 from .rasters import gdal
 from .sources import LayerSource, NoData, Source, Unsaid
 
@@ -32,7 +32,6 @@ Rectangle: TypeAlias = tuple[float, float, float, float]
 # The sources of layers, by the layers' names.
 Sources: TypeAlias = Mapping[str, LayerSource | Source]
 
-MOST_CELLS = 150_000_000  # of a map; 1.2 GB for each layer
 STEEPEST_DEGREES = 10.0  # if the rms slope is above this, small coordinates must be degrees
 
 
@@ -190,17 +189,21 @@ def open_map(
     cell_size: float | None = None,
     height_range: tuple[float, float] | None = None,
     allow_external: bool = False,
+    most_cells: int = MOST_CELLS,
 ) -> Iterator[OpenMap]:
     """Open a map, to count its cells and to read surfaces of it: of the whole, in part, coarser.
 
     The heights are opened at once. Further layers are opened once, for the first surface. See
-    ``read_surface`` for the arguments. Raises MapError or InputError with the file, the value and
-    the remedy.
+    ``read_surface`` for the arguments; most_cells is of maps that are read as a whole when they
+    are opened, as points and maps of robots. Raises MapError or InputError with the file, the
+    value and the remedy.
     """
     require_not_negative(fill_holes=fill_holes)
+    require_count(most=2**62, most_cells=most_cells)
     unsaid = Unsaid.of(
         crs, nodata, height_unit, cell_size, height_range, allow_external=allow_external
     )
+    unsaid = replace(unsaid, most_cells=most_cells)
     files = ExitStack()
     opened = None
     try:
@@ -329,6 +332,8 @@ def read_surface(
     converted to the plane's unit. Raises MapError or InputError with the file, the value and the
     remedy.
     """
+    require_count(most=2**62, most_cells=most_cells)
+    is_whole = within is None and decimate == 1
     with open_map(
         source,
         height_band=height_band,
@@ -343,19 +348,9 @@ def read_surface(
         cell_size=cell_size,
         height_range=height_range,
         allow_external=allow_external,
+        # Of a map that is read in part or coarser, the whole may have more.
+        most_cells=most_cells if is_whole else max(MOST_CELLS, most_cells),
     ) as opened:
         return opened.surface(
             within=within, margin=margin, decimate=decimate, most_cells=most_cells
         )
-
-
-def count_cells(
-    source: Source,
-    *,
-    height_band: int | str = 1,
-    crs: CRS | str | int | None = None,
-    within: Rectangle | None = None,
-) -> int:
-    """How many cells ``read_surface`` would read of the heights, from the header alone."""
-    with open_map(source, height_band=height_band, crs=crs) as opened:
-        return opened.cells(within)

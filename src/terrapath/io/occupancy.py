@@ -16,15 +16,14 @@ from ..errors import MapError
 from ..surface.raster import Grid
 from ..validation import Array, is_there
 from .arrays import ArrayBand
-from .bands import Band
+from .bands import FARTHEST, Band, require_few_cells
 from .rasters import gdal, open_dataset, reading
-from .sources import require_safe
+from .sources import Unsaid, require_safe
 
 Cells = npt.NDArray[np.bool_]
 
-MOST_CELLS = 150_000_000
 MOST_BYTES = 1_000_000  # of a description
-FARTHEST, FARTHEST_TURN = 1e12, 1e3  # metres and radians; beyond that nothing is precise
+FARTHEST_TURN = 1e3  # radians; beyond that nothing is precise
 MODES = ("trinary", "scale", "raw")
 OCCUPIED = 100.0
 PASSABLE = b".GS"  # ground and shallow water, in maps of MovingAI
@@ -49,7 +48,7 @@ def occupancy_band(
 # nav2: a description in YAML and a picture
 
 
-def open_nav2(path: Path, number: int | str, *, allow_external: bool) -> Band:
+def open_nav2(path: Path, number: int | str, unsaid: Unsaid) -> Band:
     """A map of nav2's map_server: ``map.yaml`` and its picture.
 
     Occupied and unknown cells are blocked, by the thresholds and the mode as map_server reads them
@@ -57,7 +56,7 @@ def open_nav2(path: Path, number: int | str, *, allow_external: bool) -> Band:
     """
     about = _description(path)
     image = path.parent / str(about["image"])
-    if not allow_external:
+    if not unsaid.allow_external:
         from .._support.external import ALLOW, reaches_out
 
         if reaches_out(str(about["image"]), path.parent):
@@ -66,7 +65,7 @@ def open_nav2(path: Path, number: int | str, *, allow_external: bool) -> Band:
     if not resolution > 0.0:
         raise MapError(f"{path}: resolution={resolution:g} must be above 0, metres a cell")
     x, y, yaw = _origin(path, about)
-    occupancy, unknown = _occupancy(path, about, *_shades(image, allow_external))
+    occupancy, unknown = _occupancy(path, about, *_shades(image, unsaid))
     blocked = unknown | (occupancy >= OCCUPIED)
     transform = (
         Affine.translation(x, y)
@@ -113,14 +112,13 @@ def _origin(path: Path, about: dict[str, Any]) -> tuple[float, float, float]:
     return x, y, yaw
 
 
-def _shades(image: Path, allow_external: bool) -> tuple[Array, Array]:
+def _shades(image: Path, unsaid: Unsaid) -> tuple[Array, Array]:
     """Brightness and opacity of a picture's cells, from 0 to 1."""
-    require_safe(image, allow_external=allow_external)
+    require_safe(image, allow_external=unsaid.allow_external)
     if not is_there(image):
         raise MapError(f"{image} does not exist; check 'image' in the map's YAML file")
     with gdal(), reading(image), open_dataset(image) as picture:
-        if picture.width * picture.height > MOST_CELLS:
-            raise MapError(f"{image} has {picture.width:,} x {picture.height:,} cells, too many")
+        require_few_cells(str(image), picture.height, picture.width, unsaid.most_cells)
         kinds = list(picture.colorinterp)
         bands = picture.read()
         if kinds[0] == ColorInterp.palette:
@@ -165,7 +163,7 @@ def _occupancy(
 # MovingAI: rows of letters
 
 
-def open_movingai(path: Path, number: int | str) -> Band:
+def open_movingai(path: Path, number: int | str, most_cells: int) -> Band:
     """A grid of the MovingAI benchmarks (Sturtevant 2012): x is the column, y the row, downwards.
 
     The centre of the first cell is (0, 0), as in the problems that belong to the map.
@@ -182,6 +180,7 @@ def open_movingai(path: Path, number: int | str) -> Band:
     lines = body.split()
     if not found or len(lines) != rows or any(len(line) != columns for line in lines):
         raise MapError(f"{path} does not hold {rows} rows of {columns} cells, as it says")
+    require_few_cells(str(path), rows, columns, most_cells)
     cells = np.frombuffer(b"".join(lines), np.uint8).reshape(rows, columns)
     blocked = ~np.isin(cells, np.frombuffer(PASSABLE, np.uint8))
     transform = Affine.translation(-0.5, -0.5)

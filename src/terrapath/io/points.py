@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from pyproj import CRS
 from rasterio import Affine
 
@@ -17,66 +18,76 @@ from ..surface.georeference import parse_crs
 from ..surface.raster import Grid
 from ..validation import Array
 from .arrays import ArrayBand
-from .bands import Band
+from .bands import FARTHEST, Band, require_few_cells
 from .rasters import reading, with_crs
+from .sources import Unsaid
 
-MOST_CELLS = 150_000_000
 FEWEST = 16  # points of a map
-FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 POINTS_IN_CELL = 4.0  # on average, where no cell is given
 
 NAMES = (("x", "easting", "lon", "longitude"), ("y", "northing", "lat", "latitude"),
          ("z", "height", "elevation", "altitude"))  # fmt: skip
 
 
-def open_points(
-    path: Path, number: int | str, crs: CRS | None, cell: float | None, read: str
-) -> Band:
+def open_points(path: Path, number: int | str, unsaid: Unsaid, read: str) -> Band:
     """The points of a file as a band: the mean of the heights in each cell; voids have no data.
 
-    cell : the cells' side; None takes cells that hold four points on average. It is told, and so
-    are the voids. read : the name of the reader.
+    The cells' side is the one that is said; otherwise cells hold four points on average. It is
+    told, and so are the voids. read : the name of the reader.
     """
     if number != 1:
         raise MapError(f"band={number!r} is not in {path}; points have one band, their height")
     with reading(path):
         points, own = READERS[read](path)
-    points = points[np.isfinite(points).all(axis=1)]
+    points = _checked(path, points[np.isfinite(points).all(axis=1)])
+    grid = _grid_of(path, points, unsaid)
+    counts, means = _means(points, grid)
+    side, voids = grid.transform.a, float((counts == 0).mean())
+    tell(
+        MapWarning(
+            f"{path}: {len(points):,} points are averaged on {grid.columns:,} x {grid.rows:,} "
+            f"cells of side {side:.6g}; {100.0 * voids:.3g} % of the cells are void, and blocked; "
+            "change that by --cell-size and --fill-holes"
+        )
+    )
+    grid = Grid(grid.rows, grid.columns, grid.transform, with_crs(own, unsaid.crs, path))
+    return ArrayBand(grid=grid, label=str(path), unit="", step=0.0, array=means, is_gridded=True)
+
+
+def _checked(path: Path, points: Array) -> Array:
+    """The points (n, 3), where a map can be made of them."""
     if len(points) and np.abs(points).max() > FARTHEST:
         raise MapError(f"{path} has a point beyond {FARTHEST:g}, where no map is; remove it")
     if len(points) < FEWEST:
         raise MapError(f"{path} holds {len(points)} points; a map needs at least {FEWEST}")
-    low, span = points[:, :2].min(axis=0), np.ptp(points[:, :2], axis=0)
-    if not (span > 0.0).all():
+    if not (np.ptp(points[:, :2], axis=0) > 0.0).all():
         raise MapError(f"{path}: all points lie on one line; a map needs points side by side")
+    return points
+
+
+def _grid_of(path: Path, points: Array, unsaid: Unsaid) -> Grid:
+    """The cells to average the points in, rows from south to north."""
+    low, span = points[:, :2].min(axis=0), np.ptp(points[:, :2], axis=0)
     step = _step(points)
-    side = cell or step or float(np.sqrt(POINTS_IN_CELL * span.prod() / len(points)))
+    mean = float(np.sqrt(POINTS_IN_CELL * span.prod() / len(points)))
+    side = unsaid.cell_size or step or mean
     if side == step:
         low = low - 0.5 * side  # the points are the centres of cells
     columns, rows = (np.floor(span / side).astype(int) + 1).tolist()
-    if rows * columns > MOST_CELLS:
-        raise MapError(
-            f"{path}: cells of {side:g} make {columns:,} x {rows:,} cells, more than "
-            f"{MOST_CELLS:,}; give larger ones by --cell-size"
-        )
-    place = ((points[:, :2] - low) / side).astype(np.intp)
-    index = place[:, 1] * columns + place[:, 0]
-    counts = np.bincount(index, minlength=rows * columns)
-    sums = np.bincount(index, points[:, 2], minlength=rows * columns)
-    means = np.full(rows * columns, np.nan)
+    require_few_cells(f"{path}, on cells of {side:g},", rows, columns, unsaid.most_cells)
+    return Grid(rows, columns, Affine(side, 0.0, low[0], 0.0, side, low[1]))
+
+
+def _means(points: Array, grid: Grid) -> tuple[npt.NDArray[np.intp], Array]:
+    """How many points each cell holds, and their mean height (rows, columns), NaN for none."""
+    low = np.array([grid.transform.c, grid.transform.f])
+    place = ((points[:, :2] - low) / grid.transform.a).astype(np.intp)
+    index, count = place[:, 1] * grid.columns + place[:, 0], grid.rows * grid.columns
+    counts = np.bincount(index, minlength=count)
+    sums = np.bincount(index, points[:, 2], minlength=count)
+    means = np.full(count, np.nan)
     np.divide(sums, counts, out=means, where=counts > 0)
-    voids = float((counts == 0).mean())
-    tell(
-        MapWarning(
-            f"{path}: {len(points):,} points are averaged on {columns:,} x {rows:,} cells of side "
-            f"{side:.6g}; {100.0 * voids:.3g} % of the cells are void, and blocked; change that by "
-            "--cell-size and --fill-holes"
-        )
-    )
-    grid = Grid(rows, columns, Affine(side, 0.0, low[0], 0.0, side, low[1]))
-    grid = Grid(rows, columns, grid.transform, with_crs(own, crs, path))
-    heights = means.reshape(rows, columns)
-    return ArrayBand(grid=grid, label=str(path), unit="", step=0.0, array=heights, is_gridded=True)
+    return counts, means.reshape(grid.rows, grid.columns)
 
 
 def _step(points: Array) -> float | None:

@@ -23,7 +23,7 @@ from .._support.external import (
 from ..errors import InputError, MapError, MapWarning, tell
 from ..surface.georeference import LENGTH_UNITS, metres_of, parse_crs
 from ..validation import Array, require_no_pipe, require_not_negative, require_positive
-from .bands import Band
+from .bands import MOST_CELLS, Band
 from .rasters import open_band, reading
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ class LayerSource:
         """
         if heights:
             return unsaid.applied_to(self._opened(files, unsaid, heights=True))
-        alone = Unsaid(allow_external=unsaid.allow_external)
+        alone = Unsaid(allow_external=unsaid.allow_external, most_cells=unsaid.most_cells)
         return self._opened(files, alone, heights=False)
 
     def _opened(self, files: ExitStack, unsaid: Unsaid, *, heights: bool) -> Band:
@@ -253,7 +253,8 @@ class Unsaid:
     crs : the CRS of a map that has none. is_local : no CRS is looked for. no_data : see ``NoData``.
     height_unit : of heights that have none. cell_size : the side of the cells of a picture.
     height_range : the heights that a picture's darkest and brightest numbers stand for.
-    allow_external : the files may take their data from outside their folders.
+    allow_external : the files may take their data from outside their folders. most_cells : of a
+    map that is read as a whole.
     """
 
     crs: CRS | None = None
@@ -263,6 +264,7 @@ class Unsaid:
     cell_size: float | None = None
     height_range: tuple[float, float] | None = None
     allow_external: bool = False
+    most_cells: int = MOST_CELLS
 
     @classmethod
     def of(

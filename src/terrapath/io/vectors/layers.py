@@ -17,9 +17,9 @@ from ..._support.extras import require_packages
 from ...errors import MapError, RepairedWarning, VectorWarning, silence, tell
 from ...space.free_space import Geometries, Indices, simple_parts
 from ...validation import is_there
+from ..bands import FARTHEST
 from ..sources import require_safe
 
-FARTHEST = 1e12  # no coordinate of a map is larger, in any unit
 MOST_BYTES = 4 * 2**30
 MOST_TO_KNOW_GML = 4096  # bytes in which GML names its namespace
 PACKED = (".gz", ".zip")
