@@ -202,8 +202,8 @@ def test_every_format_has_the_same_points_and_numbers(ending, tmp_path):
     if ending == ".gpx":
         track = gpxpy.parse(target.read_text()).tracks[0]
         found = [(p.longitude, p.latitude) for p in track.segments[0].points]
-        assert f"{path.ground_length:.6g} m on the ground" in track.description
-        assert f"minimised: {solution.value:.6g} weighted m" in track.description
+        assert f"{path.ground_length:,.3f} m on the ground" in track.description
+        assert f"minimised: {solution.value:,.3f} weighted m" in track.description
     elif ending == ".csv":
         with target.open(newline="") as stream:
             rows = list(csv.DictReader(stream))

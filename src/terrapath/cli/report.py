@@ -13,6 +13,7 @@ from ..problem import Path, Problem, Solution, Status
 from ..problem.solution import LARGE_GAP
 from ..scenario.answers import goal_status
 from ..surface import Layer, Surface
+from ..surface.georeference import with_unit
 from ..surface.ground import is_weighted, value_unit
 from .console import percent, remark
 
@@ -23,12 +24,6 @@ if TYPE_CHECKING:
 
 # At most this many of a planner's alternative routes are shown.
 MOST_ALTERNATIVES = 5
-
-
-def _amount(value: float, unit: str) -> str:
-    """A number with its unit: three digits after the point from 1,000 on, six below."""
-    digits = ",.3f" if abs(value) >= 1000.0 else ".6f"
-    return f"{value:{digits}} {unit}".rstrip()
 
 
 def _gap(solution: Solution, target: float | None) -> str:
@@ -51,7 +46,7 @@ def _grade(slope: float) -> str:
 def _longer(length: float, than: float, unit: str) -> str:
     """A length, and how much longer it is than the path."""
     more = length / than - 1.0 if than > 0.0 else 0.0
-    return f"{_amount(length, unit)} ({percent(more) + ' longer' if more > 1e-9 else 'as long'})"
+    return f"{with_unit(length, unit)} ({percent(more) + ' longer' if more > 1e-9 else 'as long'})"
 
 
 def _point(problem: Problem, point: tuple[float, float]) -> str:
@@ -74,16 +69,16 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
     if path is None or length is None:
         return
     unit = solution.unit
-    yield "value", f"{_amount(length, unit)}; what was minimised"
+    yield "value", f"{with_unit(length, unit)}; what was minimised"
     if solution.lower_bound is not None:
-        yield "lower bound", f"{_amount(solution.lower_bound, unit)}; {solution.bound_in_words}"
+        yield "lower bound", f"{with_unit(solution.lower_bound, unit)}; {solution.bound_in_words}"
         yield "gap", _gap(solution, target_gap)
     yield from _on_the_ground(path)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
     assert solution.cost is not None
-    yield "planner's cost", _amount(solution.cost, unit)
-    yield "straight-line length", _amount(solution.straight_length, unit)
+    yield "planner's cost", with_unit(solution.cost, unit)
+    yield "straight-line length", with_unit(solution.straight_length, unit)
     yield from _contributions(path)
     if solution.alternatives:
         others = solution.alternatives[:MOST_ALTERNATIVES]
@@ -93,8 +88,8 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
 def _on_the_ground(path: Path) -> Iterator[tuple[str, str]]:
     """What people ask of a route, whatever was minimised."""
     unit = path.ground_unit
-    yield "ground length", _amount(path.ground_length, unit)
-    yield "climb, descent", f"{_amount(path.climb, unit)}, {_amount(path.descent, unit)}"
+    yield "ground length", with_unit(path.ground_length, unit)
+    yield "climb, descent", f"{with_unit(path.climb, unit)}, {with_unit(path.descent, unit)}"
     yield "steepest grade", f"{_grade(path.steepest)} along the route"
     yield "side slope", f"{_grade(path.steepest_side)} at most, across the route"
 
@@ -132,8 +127,8 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     corridor, unit = solution.corridor, solution.problem.surface.unit
     if corridor is None:
         return
-    around = _amount(corridor.half_width, unit)
-    coarse = _amount(corridor.coarse_length, solution.unit)
+    around = with_unit(corridor.half_width, unit)
+    coarse = with_unit(corridor.coarse_length, solution.unit)
     yield (
         "corridor",
         f"{around} on both sides of a route of {coarse}, planned on the map read "
@@ -143,7 +138,7 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     if least is None:
         yield "elsewhere", "nothing is proven: a path there may cost less"
     else:
-        chords = _amount(least, solution.unit)
+        chords = with_unit(least, solution.unit)
         verb = "costs less" if is_weighted(solution.problem.surface) else "is shorter"
         yield "elsewhere", f"no path on the map {verb} than {chords}, by chords"
 
@@ -165,7 +160,7 @@ def _fit(surface: Surface) -> Iterator[tuple[str, str]]:
         largest = _each(surface, fit.smoothing.largest_change)
         yield (
             "smoothed",
-            f"over {_amount(fit.smoothing.scale, surface.unit)}; moved by at most {largest}; "
+            f"over {with_unit(fit.smoothing.scale, surface.unit)}; moved by at most {largest}; "
             f"rms {_each(surface, fit.smoothing.rms_change)}",
         )
 
@@ -196,7 +191,7 @@ def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
     if problem.obstacles:
         yield "obstacles", f"{len(problem.obstacles):,}"
     if problem.radius:
-        yield "vehicle radius", _amount(problem.radius, unit) + ", kept from everything blocked"
+        yield "vehicle radius", with_unit(problem.radius, unit) + ", kept from everything blocked"
     if problem.max_slope is not None:
         limit = problem.constraints.slope_limit
         by = "by Horn's formula" if limit is not None and limit.by_horn else "at their steepest"
@@ -243,7 +238,7 @@ def _print_parts(heading: str, header: tuple[str, ...], rows: Iterable[tuple[str
 
 
 def _optional(value: float | None, unit: str) -> str:
-    return "-" if value is None or not np.isfinite(value) else _amount(value, unit)
+    return "-" if value is None or not np.isfinite(value) else with_unit(value, unit)
 
 
 def _print_legs(solution: Solution) -> None:
@@ -267,7 +262,7 @@ def _print_legs(solution: Solution) -> None:
 def _ground_length(solution: Solution | None) -> str:
     if solution is None or solution.path is None:
         return "-"
-    return _amount(solution.path.ground_length, solution.path.ground_unit)
+    return with_unit(solution.path.ground_length, solution.path.ground_unit)
 
 
 def _print_goals(goals: Iterable[GoalAnswer], unit: str) -> None:
@@ -314,7 +309,7 @@ def print_check(problem: Problem, certificate: Certificate, seconds: float) -> N
             ("certificate", "holds"),
             ("start", _point(problem, problem.start)),
             ("goal", _point(problem, problem.goal)),
-            ("lower bound", f"{_amount(certificate.value, unit)}; {claim}"),
+            ("lower bound", f"{with_unit(certificate.value, unit)}; {claim}"),
             ("dual norm", f"at most {certificate.norm:.9g}"),
             ("cells", f"{lattice.nx - 1:,} x {lattice.ny - 1:,}"),
             ("seconds", f"{seconds:.3f}"),
@@ -332,8 +327,8 @@ def print_field(field: DistanceField, seconds: float) -> None:
         [
             ("start", _point(problem, problem.start)),
             ("nodes", f"{lattice.nx:,} x {lattice.ny:,}, {percent(field.reached)} reached"),
-            ("spacing", _amount(max(lattice.dx, lattice.dy), unit)),
-            ("farthest", _amount(float(reached.max(initial=0.0)), value_unit(problem.surface))),
+            ("spacing", with_unit(max(lattice.dx, lattice.dy), unit)),
+            ("farthest", with_unit(float(reached.max(initial=0.0)), value_unit(problem.surface))),
             ("seconds", f"{seconds:.3f}"),
         ]
     )

@@ -40,6 +40,12 @@ def metres_of(unit: str) -> float | None:
     return LENGTH_UNITS.get(unit.strip().lower())
 
 
+def with_unit(value: float, unit: str) -> str:
+    """A number with its unit: three digits after the point from 1,000 on, six below."""
+    digits = ",.3f" if abs(value) >= 1000.0 else ".6f"
+    return f"{value:{digits}} {unit}".rstrip()
+
+
 def parse_crs(text: object, name: str = "the CRS") -> CRS | None:
     """A horizontal CRS from anything that names one; None where there is none.
 

@@ -12,6 +12,7 @@ import numpy as np
 from ...problem import Path, Solution
 from ...problem.path import Indices
 from ...problem.simplification import cell_size, default_tolerance, simplified
+from ...surface.georeference import with_unit
 from ...validation import Array, require_not_negative
 
 
@@ -66,21 +67,17 @@ class Route:
         """The route in words, for formats that have no columns for numbers."""
         solution, path = self.solution, self.path
         text = (
-            f"{_amount(path.ground_length, path.ground_unit)} on the ground, "
-            f"climb {_amount(path.climb, path.ground_unit)}, "
-            f"descent {_amount(path.descent, path.ground_unit)}, "
+            f"{with_unit(path.ground_length, path.ground_unit)} on the ground, "
+            f"climb {with_unit(path.climb, path.ground_unit)}, "
+            f"descent {with_unit(path.descent, path.ground_unit)}, "
             f"steepest grade {100.0 * path.steepest:.3g} %, "
             f"steepest side slope {100.0 * path.steepest_side:.3g} %; "
-            f"minimised: {_amount(path.length, solution.unit)}"
+            f"minimised: {with_unit(path.length, solution.unit)}"
         )
         if solution.lower_bound is not None:
-            bound = _amount(solution.lower_bound, solution.unit)
+            bound = with_unit(solution.lower_bound, solution.unit)
             text += f", {solution.bound_in_words} than {bound}, gap {solution.gap_in_words}"
         if self.tolerance:
-            near = _amount(self.tolerance, path.surface.unit)
+            near = with_unit(self.tolerance, path.surface.unit)
             text += f"; points are within {near} of the route"
         return f"{text}; {solution.planner}, seed {solution.seed}"
-
-
-def _amount(value: float, unit: str) -> str:
-    return f"{value:.6g} {unit}".rstrip()
