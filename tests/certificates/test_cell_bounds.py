@@ -1,17 +1,22 @@
 """Lower bounds where costs are constant in cells: piecewise linear potentials and their proofs."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 import terrapath as tp
 from cost_rasters import CELL, Walker, random_costs, random_heights
 from terrapath._kernels.certificates import norms
 from terrapath._kernels.certificates.potentials import Potential, linear_value
 from terrapath._kernels.certificates.surface_models import Box
-from terrapath.certificates.certificate import seal_of
+from terrapath.certificates.certificate import certify, seal_of
+from terrapath.certificates.claims import Claim, Core, cell_needs
 from terrapath.errors import CertificateError
+from terrapath.space.lattice import Lattice
+from terrapath.surface.bounds import Bounds
 
 
 def problem_of(seed, count=24, steep=0.0, **options):
@@ -78,14 +83,63 @@ def test_no_path_is_shorter_than_the_bound(seed, steep):
 
 
 def test_bounds_that_cut_cells_and_obstacles_are_proven_with():
-    import shapely
-
     obstacles = [shapely.box(70.0, 60.0, 110.0, 183.0)]
     problem, _ = problem_of(4, bounds=(3.0, 8.0, 223.0, 219.0), obstacles=obstacles)
     solution = tp.plan(problem, "optimal", target_gap=0.04)
     assert solution.gap <= 0.05
     assert solution.certificate is not None
     solution.certificate.check(problem)
+
+
+def shunned(**options):
+    """Cheap cells behind a side at x = 145 that a path may touch, but not cross."""
+    axis, costs = 10.0 * np.arange(20), np.full((20, 20), 50.0)
+    costs[:, 15] = 1.0
+    flat = np.zeros_like(costs)
+    surface = tp.read_surface((flat, axis, axis), costs={"going": (costs, axis, axis)})
+    return tp.Problem(surface, (100.0, 20.0), (100.0, 150.0), **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "x"),
+    [
+        ({"bounds": (40.0, 0.0, 145.0, 190.0)}, 145.0),
+        ({"bounds": (40.0, 0.0, 145.0 - 1e-7, 190.0)}, 145.0 - 1e-7),
+        ({"obstacles": [shapely.box(145.0, -10.0, 155.0, 200.0)]}, 145.0 - 1e-7),
+    ],
+)
+def test_bounds_hold_for_paths_along_the_edge_of_free_space(options, x):
+    problem = shunned(**options)
+    path = problem.path([(100.0, 20.0), (x, 20.0), (x, 150.0), (100.0, 150.0)])
+    assert problem.allows(path)
+    bound = tp.lower_bound(problem, length=6500.0)
+    bound.check(problem)
+    assert bound.value <= path.length * (1.0 + 1e-9)
+    assert bound.value >= 0.9 * path.length
+
+
+@pytest.mark.parametrize("beside", [1e-8, 0.9e-7, 1.5e-7])
+def test_a_lattice_beside_the_sides_of_cells_is_refused(beside):
+    # Where u climbs as steeply as the dear cells allow, on a strip of cheap ground.
+    axis, costs = np.arange(8) + 0.5, np.ones((8, 8))
+    costs[:, 4:] = 1e9
+    flat = np.zeros_like(costs)
+    surface = tp.read_surface((flat, axis, axis), costs={"going": (costs, axis, axis)})
+    problem = tp.Problem(surface, (1.0, 4.0), (4.0 - 0.2 * beside, 4.0))
+    lattice = Lattice(Bounds(0.5 - beside, 0.5, 7.5 - beside, 7.5), 15, 15)
+    side = 4.0 - beside
+    rise = np.where(lattice.x < side + 0.1, lattice.x - 1.0, side - 1.0 + 1e9 * (lattice.x - side))
+    claim = Claim(
+        value=0.0,
+        norm=math.inf,
+        coefficients=np.pad(np.tile(rise, (15, 1)), 1, mode="edge"),
+        bounds=lattice.bounds,
+        horizon=1e9,
+        start_core=Core(0, 2, 6, 8),
+        goal_core=Core(6, 8, 6, 8),
+    )
+    with pytest.raises(CertificateError, match="beside"):
+        certify(problem, claim, cell_needs(problem, claim, 0.999)).check(problem)
 
 
 def test_a_forged_bound_is_refused(tmp_path):

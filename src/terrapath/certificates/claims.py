@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.certificates import norms as kernels
-from .._kernels.certificates.potentials import Potential, linear_value
+from .._kernels.certificates.potentials import Potential
 from .._kernels.surface.points import fill_values
 from .._kernels.surface.surfaces import Peaks, Spline
 from .._support.watching import MustStop, never
@@ -26,6 +26,7 @@ from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
 from ..surface.layers import span_within
 from ..validation import Array, Point
+from .sides import margins_at_ends, not_even_touched, require_fit
 
 # A relative margin, far above the rounding errors of the checker, far below any gap.
 ROUNDING = 1e-9
@@ -84,6 +85,11 @@ class Claim:
         return Lattice(self.bounds, columns - 2, rows - 2)
 
 
+def is_linear(problem: Problem) -> bool:
+    """Is u linear over triangles, of a lattice that may reach beyond the bounds?"""
+    return problem.surface.cost_cells is not None
+
+
 def require_sound(claim: Claim) -> None:
     """Raise CertificateError for numbers that are not finite, or a wrong array of coefficients."""
     value, norm, horizon = claim.value, claim.norm, claim.horizon
@@ -105,8 +111,9 @@ def require_sound(claim: Claim) -> None:
 
 def _require_fit(problem: Problem, claim: Claim) -> None:
     """Raise CertificateError where the claim does not fit the problem."""
-    # Cells of constant cost may reach beyond the bounds, where no path can go.
-    if problem.surface.cost_cells is None and not problem.bounds.encloses(claim.bounds):
+    if is_linear(problem):
+        require_fit(problem.surface.data, claim.lattice, problem.bounds)
+    elif not problem.bounds.encloses(claim.bounds):
         raise CertificateError(
             f"the certificate covers {claim.bounds}, which is not within {problem.bounds}"
         )
@@ -172,8 +179,8 @@ def _potential(problem: Problem, claim: Claim) -> Potential:
     """The function u, with the start as the origin."""
     (x, y), lattice = problem.start, claim.lattice
     corner_x, corner_y = lattice.bounds.x1_min - x, lattice.bounds.x2_min - y
-    is_linear, steps = problem.surface.cost_cells is not None, (lattice.dx, lattice.dy)
-    return Potential(claim.coefficients, corner_x, corner_y, *steps, is_linear)
+    steps = lattice.dx, lattice.dy
+    return Potential(claim.coefficients, corner_x, corner_y, *steps, is_linear(problem))
 
 
 def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
@@ -189,13 +196,10 @@ def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
 
 
 def exempt_cells(problem: Problem, claim: Claim) -> Cells:
-    """Cells (ny, nx) that no path meets between its start core and its goal core.
-
-    A piecewise linear u holds in the cores, too.
-    """
+    """Cells (ny, nx) that no path meets between its cores, or at all where u is linear."""
     exempt = problem.free_space.covered_cells(claim.lattice)
-    if problem.surface.cost_cells is not None:
-        return exempt
+    if is_linear(problem):
+        return not_even_touched(exempt)
     for core in (claim.start_core, claim.goal_core):
         exempt[core.row0 : core.row1, core.column0 : core.column1] = True
     return exempt
@@ -320,22 +324,19 @@ def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
     piecewise linear u needs no cores: p is the start and q the goal.
     """
     surface, start, goal = _ground(problem)
-    doubt = _doubt(surface)
-    least = problem.surface.least_cost
+    doubt, least = _doubt(surface), problem.surface.least_cost
     straight = max(least * (math.dist(start, goal) * (1.0 - ROUNDING) - doubt), 0.0)
-    is_linear = problem.surface.cost_cells is not None
-    if not is_linear and _overlap(claim.start_core, claim.goal_core):
-        return straight
-    detour = least * least_detour(problem, claim.bounds) * (1.0 - ROUNDING)
-    begin = End(claim.start_core, problem.start, start, doubt)
-    end = End(claim.goal_core, problem.goal, goal, doubt)
-    if is_linear:
+    if is_linear(problem):
         u = _potential(problem, claim)
-        first = -float(linear_value(u, *start[:2])) / norm
-        last = float(linear_value(u, *goal[:2])) / norm
+        first, last = margins_at_ends(problem.surface.data, claim.lattice, u, start, goal, norm)
+    elif _overlap(claim.start_core, claim.goal_core):
+        return straight
     else:
+        begin = End(claim.start_core, problem.start, start, doubt)
+        end = End(claim.goal_core, problem.goal, goal, doubt)
         first = edge_margin(problem, claim, begin, -1.0 / norm)
         last = edge_margin(problem, claim, end, 1.0 / norm)
+    detour = least * least_detour(problem, claim.bounds) * (1.0 - ROUNDING)
     rest = min(last, claim.horizon / norm - least * doubt)
     within = first + rest - ROUNDING * (abs(first) + abs(rest))
     # ``within`` is NaN where something overflowed; then the comparison is False.

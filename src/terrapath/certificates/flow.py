@@ -25,6 +25,7 @@ from ..surface.metric import inverse_metric_tensor
 from ..validation import Array, Point
 from .certificate import Certificate, certify
 from .claims import Claim, Core, cell_needs
+from .sides import not_even_touched
 
 # The numbers of lattice cells on a side of a cell of constant cost; even, so that the centres of
 # cells, where the pieces of the ground meet, are on its lines, too.
@@ -48,6 +49,9 @@ GOOD_GAP = 2e-3
 
 # The cost in the search where no path can be.
 FREE = 1e30
+
+# A line this near to a place goes through it, in steps of the lattice.
+NEAR = 1e-6
 
 # A norm as low as this needs no closer look.
 FLAT_ENOUGH = 0.999
@@ -81,12 +85,16 @@ def _aligned(problem: Problem, window: Bounds, merged: int, per_cell: int) -> La
     data = problem.surface.data
     assert isinstance(data, Spline)
     cells, axes = data.cells, []
-    for low, high, origin, step in (
-        (window.x1_min, window.x1_max, cells.x0, merged * cells.dx / per_cell),
-        (window.x2_min, window.x2_max, cells.y0, merged * cells.dy / per_cell),
+    west, south, east, north = problem.bounds
+    for low, high, ends, origin, step in (
+        (window.x1_min, window.x1_max, (west, east), cells.x0, merged * cells.dx / per_cell),
+        (window.x2_min, window.x2_max, (south, north), cells.y0, merged * cells.dy / per_cell),
     ):
-        first = math.floor((low - origin) / step + 1e-6)
-        last = max(math.ceil((high - origin) / step - 1e-6), first + 1)
+        first = math.floor((low - origin) / step + NEAR)
+        last = max(math.ceil((high - origin) / step - NEAR), first + 1)
+        # A path may run along a side of the bounds, with the cost of the cells beyond.
+        first -= abs(origin + first * step - ends[0]) <= NEAR * step
+        last += abs(origin + last * step - ends[1]) <= NEAR * step
         axes.append((origin + first * step, origin + last * step, last - first + 1))
     (x0, x1, nx), (y0, y1, ny) = axes
     return Lattice(Bounds(x0, y0, x1, y1), nx, ny)
@@ -154,8 +162,7 @@ class FlowSearch:
         unit = math.sqrt(lattice.dx * lattice.dy)
         inverse *= unit * unit / np.outer(lattice.spacing, lattice.spacing)
         costs *= smooth * unit
-        covered = self.problem.free_space.covered_cells(lattice)
-        costs[covered] = FREE
+        costs[not_even_touched(self.problem.free_space.covered_cells(lattice))] = FREE
         return costs, _roots(inverse)
 
     def _note(self) -> None:
