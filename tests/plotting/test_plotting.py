@@ -5,6 +5,7 @@ import json
 import re
 from copy import copy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -95,6 +96,35 @@ def test_heights_and_contours_of_a_further_layer_are_named():
     assert "height" in [text.get_text() for text in perspective.texts]
     shown = [text.get_text() for text in plane.get_legend().get_texts()]
     assert "contours: resistance" in shown
+
+
+@pytest.mark.parametrize("turns", range(4))
+def test_the_legend_covers_neither_the_path_nor_its_ends(turns):
+    # An L along two sides of the map leaves one corner.
+    corners = np.roll([(1, 1), (1, 9), (9, 9), (9, 1)], turns, axis=0)
+    start, middle, goal, free = map(tuple, corners)
+    flat = tp.Surface.from_grid(np.zeros((11, 11)), np.arange(11.0), np.arange(11.0))
+    problem = tp.Problem(flat, start, goal)
+    path = problem.path([start, middle, goal])
+    solution = replace(tp.RRT().solve(problem), path=path, tree=None)
+    figure = draw_route(solution)
+    FigureCanvasAgg(figure).draw()
+    axes = figure.axes[0]
+    box = axes.transData.inverted().transform_bbox(axes.get_legend().get_window_extent())
+    assert np.hypot(*(np.clip(free, box.p0, box.p1) - free)) < 1.0
+    assert not any(box.contains(*point) for point in path.points)
+
+
+@pytest.mark.parametrize("is_corridor", [False, True])
+def test_what_the_path_is_kept_in_is_named(is_corridor):
+    flat = tp.Surface.from_grid(np.zeros((11, 11)), np.arange(11.0), np.arange(11.0))
+    problem = tp.Problem(flat, (2, 2), (7, 7), keep_in=shapely.box(1, 1, 8, 8))
+    solution = tp.RRT().solve(problem)
+    part = SimpleNamespace(half_width=3.0, decimate=2, coarse_length=7.0)
+    axes = draw_route(replace(solution, corridor=part) if is_corridor else solution).axes[0]
+    shown = [text.get_text() for text in axes.get_legend().get_texts()]
+    area = "the corridor of the coarse route" if is_corridor else "the keep-in area"
+    assert f"outside {area}" in shown
 
 
 def test_other_routes_are_drawn_thinner_and_dashed_with_their_lengths(problem):

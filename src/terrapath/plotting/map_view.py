@@ -37,6 +37,8 @@ OBSTACLE_COLOUR = (0.23, 0.23, 0.23, 0.9)
 MARGIN_COLOUR = (0.23, 0.23, 0.23, 0.35)
 STEEP_COLOUR = (0.42, 0.12, 0.52, 0.55)
 OUTSIDE_STYLE: dict[str, Any] = {"facecolor": "#ffffffa0", "edgecolor": "#606060", "hatch": "xxx"}
+KEEP_IN = "the keep-in area"
+CORNERS = {"upper left": (0, 1), "upper right": (1, 1), "lower left": (0, 0), "lower right": (1, 0)}
 
 
 def _outline(polygon: Polygon) -> PathPatch:
@@ -45,15 +47,18 @@ def _outline(polygon: Polygon) -> PathPatch:
     return PathPatch(Outline.make_compound_path(*paths))
 
 
-def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain) -> None:
-    """Draw obstacles as given, and around them the margin that the radius adds."""
+def draw_obstacles(axes: Any, problem: Problem, terrain: Terrain, area: str = KEEP_IN) -> None:
+    """Draw obstacles as given, and around them the margin that the radius adds.
+
+    area : what the path is kept in.
+    """
     constraints = problem.constraints
     _draw_margins(axes, problem, terrain)
     if constraints.outside is not None:
         parts = [part for part in shapely.get_parts(constraints.outside) if not part.is_empty]
         patches = PatchCollection(map(_outline, parts), zorder=2.9, linewidth=0.8, **OUTSIDE_STYLE)
         axes.add_collection(patches)
-        _explain(axes, "outside the keep-in area", OUTSIDE_STYLE["facecolor"], "#606060")
+        _explain(axes, f"outside {area}", OUTSIDE_STYLE["facecolor"], "#606060")
     if terrain.steep.any():
         _tint(axes, problem, terrain.steep, STEEP_COLOUR)
         _explain(axes, f"steeper than {problem.max_slope:g}°", STEEP_COLOUR)
@@ -183,7 +188,12 @@ def draw_start(axes: Any, problem: Problem) -> None:
 
 
 def draw_ground(
-    axes: Any, problem: Problem, opacity: float = 1.0, *, contours: bool = True
+    axes: Any,
+    problem: Problem,
+    opacity: float = 1.0,
+    *,
+    contours: bool = True,
+    area: str = KEEP_IN,
 ) -> Terrain:
     """Draw the region without a route: shaded ground, contours, obstacles, limits and labels."""
     terrain = Terrain.sample(problem, SAMPLES)
@@ -191,15 +201,28 @@ def draw_ground(
     axes.imshow(terrain.shaded(0), alpha=opacity, **style)
     if contours:
         _draw_contours(axes, terrain)
-    draw_obstacles(axes, problem, terrain)
+    draw_obstacles(axes, problem, terrain, area)
     axes.set(xlim=_extent(problem)[:2], ylim=_extent(problem)[2:], aspect="equal")
     label_axes(axes, problem)
     return terrain
 
 
+def _emptiest_corner(solution: Solution) -> str:
+    """The corner that is farthest from the path and its ends, as matplotlib names it."""
+    problem = solution.problem
+    shown = [problem.start, problem.goal]
+    if solution.path is not None:
+        shown.extend(solution.path.points.tolist())
+    x_min, x_max, y_min, y_max = _extent(problem)
+    places = (np.array(shown) - [x_min, y_min]) / [x_max - x_min, y_max - y_min]
+    clear = {name: np.hypot(*(places - at).T).min() for name, at in CORNERS.items()}
+    return max(clear, key=lambda name: float(clear[name]))
+
+
 def draw_map(axes: Any, solution: Solution) -> None:
     """Draw ground, tree and path on two-dimensional axes, or what blocks where there is no path."""
-    terrain = draw_ground(axes, solution.problem)
+    area = KEEP_IN if solution.corridor is None else "the corridor of the coarse route"
+    terrain = draw_ground(axes, solution.problem, area=area)
     if solution.path is None:
         from .blocked import Blockage, draw_blockage
 
@@ -208,6 +231,6 @@ def draw_map(axes: Any, solution: Solution) -> None:
         axes.set_title(fill(blockage.in_words, TITLE_WIDTH), fontsize=9)
     _draw_tree(axes, solution)
     _draw_path(axes, solution)
-    axes.legend(loc="upper left", fontsize=8, framealpha=0.85)
+    axes.legend(loc=_emptiest_corner(solution), fontsize=8, framealpha=0.85)
     colours = ScalarMappable(terrain.norm(0), height_colours())
     axes.figure.colorbar(colours, ax=axes, label=terrain.label(0), shrink=0.72, pad=0.02)
