@@ -13,6 +13,7 @@ import terrapath as tp
 from common import REAL_MAPS
 from horn import horn_degrees
 from rasters import UTM, write
+from terrapath.errors import BlockedError
 from terrapath.space.slope_limit import SlopeLimit
 from terrapath.surface.bounds import Bounds
 
@@ -186,3 +187,16 @@ def test_a_route_under_a_limit_on_a_map_in_degrees(tmp_path):
     ends = surface.georeference.from_lonlat(np.array([[11.0270, 46.8690], [10.9115, 46.8585]]))
     solution = tp.plan(tp.Problem(surface, *ends, max_slope=40), "fast-marching", refine=True)
     assert solution.length == pytest.approx(9508.0, rel=0.01)  # on the map warped to UTM
+
+
+@pytest.mark.parametrize("which", ["costs", "layers"])
+def test_ground_beside_gaps_of_another_layer_is_as_steep_as_it_is(which):
+    axis = 10.0 * np.arange(30)
+    plane = np.tile(axis * np.tan(np.radians(40.0)), (30, 1))
+    other = np.ones((30, 30))
+    other[:, 5:25:4] = np.nan
+    surface = tp.read_surface((plane, axis, axis), **{which: {"going": (other, axis, axis)}})
+    for x in (20.0, 60.0):
+        with pytest.raises(BlockedError, match="steep"):
+            tp.Problem(surface, (x, 100.0), (x, 120.0), max_slope=30.0)
+        tp.Problem(surface, (x, 100.0), (x, 120.0), max_slope=41.0)

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from .._kernels.surface.surfaces import Spline
 from ..errors import InputError
@@ -96,6 +97,11 @@ class SlopeLimit:
         nodata = self.surface.nodata
         return nodata if nodata is not None and _on_same_grid(nodata, x, y) else None
 
+    def _unknown(self, x: Array, y: Array) -> npt.NDArray[np.bool_] | None:
+        """Cells whose height is not known. Where only other layers have no data, it is."""
+        nodata, unknown = self._nodata(x, y), self.surface.unknown
+        return None if nodata is None else nodata.blocked if unknown is None else unknown
+
     @property
     def by_horn(self) -> bool:
         """Are slopes by Horn's formula?"""
@@ -153,9 +159,7 @@ class SlopeLimit:
             return SampledRows(self.surface, *self._axes)
         if not self.by_horn:
             return SplineRows(data.coefficients[0], data.dx, data.dy)
-        nodata = self._nodata(*self._axes)
-        missing = None if nodata is None else nodata.blocked
-        return HornRows(data.coefficients[0], data.dx, data.dy, missing)
+        return HornRows(data.coefficients[0], data.dx, data.dy, self._unknown(*self._axes))
 
     def _blocks(self) -> Iterator[tuple[int, int]]:
         """First row, and one past the last, of each block that is computed at once."""

@@ -44,7 +44,7 @@ class Native(NamedTuple):
     """The map's own cells, from which a surface was carried over.
 
     grid : as the map has it. plane : the cells of that size on the plane. missing : (rows,
-    columns) of the map, which have no data; None where all have.
+    columns) of the map, which have no height; None where all have.
     """
 
     grid: Grid
@@ -53,11 +53,16 @@ class Native(NamedTuple):
 
 
 def carried_surface(
-    raster: Raster, kinds: Sequence[Kind], missing: Cells | None, make: Callable[..., Surface]
+    raster: Raster,
+    kinds: Sequence[Kind],
+    missing: Cells | None,
+    unknown: Cells | None,
+    make: Callable[..., Surface],
 ) -> Surface:
     """The surface of a raster, whose cells all have values, on the plane.
 
-    missing : (rows, columns), which cells are to be blocked. make : as ``Surface.from_grid``.
+    missing, unknown : (rows, columns), which cells are to be blocked, and whose height is not
+    known. make : as ``Surface.from_grid``.
     """
     grid = raster.grid
     plane = grid.planning_grid()
@@ -79,7 +84,7 @@ def carried_surface(
         surface,
         fit=replace(surface.fit, method=method, value_error=error),
         resolution=resolution,
-        native=Native(grid, plane, missing),
+        native=Native(grid, plane, unknown),
     )
 
 

@@ -313,8 +313,10 @@ class Raster:
                 f"a surface needs at least {LEAST_CELLS} x {LEAST_CELLS}"
             )
 
-    def _fill(self, size: float, kinds: Sequence[Kind]) -> Cells | None:
-        """Fill small holes, and continue the ground into large ones; returns the blocked cells.
+    def _fill(self, size: float, kinds: Sequence[Kind]) -> tuple[Cells, Cells]:
+        """Fill small holes, and continue the ground into large ones.
+
+        Returns the blocked cells, and those among them whose height is not known.
 
         Costs are filled in their logarithms. They stay within their range, and so above 0. Other
         cells keep their values.
@@ -323,9 +325,8 @@ class Raster:
 
         if self._missing().all():
             raise MapError("the map holds no data at all: every cell is no-data")
-        blocked = np.zeros(self.bands.shape[1:], dtype=bool)
-        for band, kind in zip(self.bands, kinds, strict=True):
-            missing = missing_cells(band)
+        gaps = [missing_cells(band) for band in self.bands]
+        for band, kind, missing in zip(self.bands, kinds, gaps, strict=True):
             if not missing.any():
                 continue
             known = band[~missing] if kind == "cells" else None
@@ -340,8 +341,7 @@ class Raster:
                 np.exp(np.clip(band, low, high, out=band), out=band)
             if known is not None:
                 band[~missing] = known
-            blocked |= missing
-        return blocked if blocked.any() else None
+        return np.logical_or.reduce(gaps), gaps[0]
 
     def to_surface(
         self,
@@ -362,7 +362,7 @@ class Raster:
         raster = self._southward()
         raster._require_cells()
         kinds = kinds or ["rise"] * len(names)
-        missing = None if raster.is_complete else raster._fill(fill_holes, kinds)
+        blocked, unknown = (None, None) if raster.is_complete else raster._fill(fill_holes, kinds)
         make = partial(
             Surface.from_grid,
             smoothing=smoothing,
@@ -376,10 +376,10 @@ class Raster:
             if raster.needs_warp():
                 from .carrying import carried_surface
 
-                return carried_surface(raster, kinds, missing, make)
+                return carried_surface(raster, kinds, blocked, unknown, make)
             x, y = raster.grid.centres()
-            nodata = None if missing is None else Mask(missing, x, y)
-            return make(raster.bands, x, y, nodata=nodata)
+            nodata = None if blocked is None or not blocked.any() else Mask(blocked, x, y)
+            return replace(make(raster.bands, x, y, nodata=nodata), unknown=unknown)
         except MemoryError:
             rows, columns = raster.bands.shape[1:]
             raise InputError(

@@ -88,6 +88,7 @@ class Surface:
     source: str = ""  # the map that it was read from
     is_raster: bool = False  # was it made of a grid, whose cells have slopes of their own?
     native: Native | None = None  # the map's own cells, where it was carried over from them
+    unknown: npt.NDArray[np.bool_] | None = None  # cells of ``nodata`` whose height is not known
 
     def __post_init__(self) -> None:
         require_ground(self.data)
