@@ -87,7 +87,7 @@ def test_a_full_disk_loses_no_answer(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("terrapath.io.write_route", fail)
     assert run([*ROUTE, "--output", str(tmp_path / "route.csv")]) == 2
     captured = capsys.readouterr()
-    assert "true length" in captured.out
+    assert "what was minimised" in captured.out
     assert "No space left" in captured.err
 
 

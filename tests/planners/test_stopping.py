@@ -202,9 +202,9 @@ def test_optimal_refines_and_proves_by_its_clock(open_ground, monkeypatch):
     refine, prove = alternatives.refine, optimal.with_bound
     clocks, limits = [], []
 
-    def refine_noted(*args, must_stop):
+    def refine_noted(*args, must_stop, **options):
         clocks.append(must_stop)
-        return refine(*args, must_stop=must_stop)
+        return refine(*args, must_stop=must_stop, **options)
 
     def prove_noted(*args, time_limit, **options):
         limits.append(time_limit)

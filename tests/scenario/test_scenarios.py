@@ -541,7 +541,7 @@ def test_every_key_stands_in_a_written_scenario_and_can_be_switched_on(folder, c
             assert line in text
     switched = [
         line.removeprefix("# ")
-        if line.startswith("# ") and (" = " in line or "# [" in line)
+        if line.startswith("# ") and (" = " in line or "# [map." in line)
         else line
         for line in text.split("\n")
     ]
