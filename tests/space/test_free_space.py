@@ -406,7 +406,7 @@ def test_a_start_or_goal_in_or_on_an_obstacle_is_refused(end, obstacle, place):
         tp.Problem(FLAT, **ends, bounds=BOUNDS, obstacles=[obstacle])
     text = str(caught.value)
     assert text.startswith(f"{end}=({place[0]:g}, {place[1]:g}) is in")
-    assert "move it there, or allow snap=" in text
+    assert "move it there, or let it be moved with a snap of " in text
 
 
 @pytest.mark.parametrize("end", ["start", "goal"])

@@ -6,6 +6,7 @@ import shapely
 
 import terrapath as tp
 from terrapath.cli.main import run
+from terrapath.errors import BlockedError
 from terrapath.space.free_space import FreeSpace
 from terrapath.space.nearest import nearest_free
 from terrapath.surface.bounds import Bounds
@@ -68,7 +69,7 @@ def test_start_and_goal_are_moved_no_farther_than_allowed_and_this_is_said():
 def test_what_is_suggested_is_free_and_near_enough():
     with pytest.raises(tp.InputError) as caught:
         tp.Problem(FLAT, (5.3, 10), (15, 10), BOUNDS, [WALL])
-    shown = str(caught.value).split("allow snap=")[1]
+    shown = str(caught.value).split("a snap of ")[1]
     with pytest.warns(tp.errors.SnapWarning):
         tp.Problem(FLAT, (5.3, 10), (15, 10), BOUNDS, [WALL], snap=float(shown))
 
@@ -125,3 +126,22 @@ def test_a_scenario_with_constraints_keeps_to_them(tmp_path, capsys):
     assert '\nkeep_in = "area.geojson"' in text
     capsys.readouterr()
     assert run(["plan", str(file), "--quiet"]) == 0
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (1e6, 4e6), (5e5, 5.2e6)])
+@pytest.mark.parametrize("shape", ["box", "touching", "disc"])
+def test_the_place_that_is_named_can_be_given(corner, shape):
+    x0, y0 = corner
+    axis = np.arange(30.0)
+    surface = tp.Surface.from_grid(np.zeros((1, 30, 30)), x0 + axis, y0 + axis)
+    obstacle = {
+        "box": shapely.box(x0 + 5, y0 + 3, x0 + 8, y0 + 8),
+        "touching": shapely.Polygon([(x0 + 5, y0 + 5), (x0 + 9, y0 + 4), (x0 + 9, y0 + 7)]),
+        "disc": tp.Circle(x0 + 7.0, y0 + 5.0, 2.0),
+    }[shape]
+    goal = (x0 + 25.0, y0 + 25.0)
+    with pytest.raises(BlockedError) as caught:
+        tp.Problem(surface, (x0 + 5.0, y0 + 5.0), goal, obstacles=[obstacle])
+    named = str(caught.value).split("nearest free place is (")[1].split(")")[0]
+    place = tuple(map(float, named.split(",")))
+    tp.Problem(surface, place, goal, obstacles=[obstacle])

@@ -167,7 +167,8 @@ class Problem:
         if distance <= self.snap:
             tell(SnapWarning(f"{blocker}; it is moved to {there} away"))
             return place
-        remedy = f"move it there, or allow snap={_rounded_up(distance):g}"
+        far = f"{_rounded_up(distance):g} {unit}".rstrip()
+        remedy = f"move it there, or let it be moved with a snap of {far}"
         raise BlockedError(f"{blocker}; the nearest free place is {there} away: {remedy}")
 
     def between(self, start: PointLike, goal: PointLike) -> Problem:

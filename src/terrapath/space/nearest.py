@@ -40,8 +40,9 @@ def _nearest_on_square(
     distances = np.hypot(*(places - point).T)
     places = places[np.argsort(distances, kind="stable")]
     for place in places[_may_be_free(space, places)].tolist():
-        x, y = place
-        if space.blocker((x, y)) is None:
+        # A place with as many digits as messages have, so that what is read there can be given.
+        x, y = (float(f"{value:.10g}") for value in place)
+        if space.bounds.contains(np.array([x, y])) and space.blocker((x, y)) is None:
             return (x, y), math.hypot(x - point[0], y - point[1])
     return None
 
