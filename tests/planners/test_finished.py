@@ -260,3 +260,10 @@ def test_ends_so_close_that_nothing_is_proven_have_an_infinite_gap():
         solution = tp.plan(problem, planner, bound=planner != "optimal")
         assert solution.status is tp.Status.SOLVED
         assert (solution.lower_bound, solution.gap) == (0.0, math.inf)
+
+
+def test_a_bound_above_the_path_is_not_taken(raw):
+    bound = tp.lower_bound(raw.problem)
+    wrong = dataclasses.replace(bound, value=1.01 * raw.length)
+    with pytest.warns(UnfinishedWarning, match="contradicts"):
+        assert finished.with_certificate(raw, wrong).lower_bound is None

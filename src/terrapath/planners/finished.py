@@ -9,7 +9,7 @@ from typing import Any
 
 from ..certificates.certificate import Certificate
 from ..certificates.search import lower_bound
-from ..errors import tell_unfinished
+from ..errors import UnfinishedWarning, tell, tell_unfinished
 from ..geodesics.refinement import refine
 from ..problem import Problem, Solution, Status
 from ..validation import require_bool, require_positive
@@ -25,6 +25,9 @@ from .base import (
     seconds_left,
     solve_within,
 )
+
+# A bound may be above the length of a path by this share, because of rounding.
+ROUNDING = 1e-7
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,10 +183,17 @@ def with_bound(
 
 
 def with_certificate(solution: Solution, certificate: Certificate) -> Solution:
-    """The solution with its bound, which is no more than the path's length."""
-    assert solution.length is not None
-    value = min(certificate.value, solution.length)  # above it only by rounding
-    return replace(solution, lower_bound=value, certificate=certificate)
+    """The solution with its bound, which is no more than the path's length.
+
+    Above it by more than rounding, either of them is wrong, and no bound is better than that one.
+    """
+    value, length = certificate.value, solution.length
+    assert length is not None
+    if value > length * (1.0 + ROUNDING):
+        contradiction = f"{value:.10g} contradicts the path's length, {length:.10g}"
+        tell(UnfinishedWarning(f"a bound of {contradiction}; it is left out; please report this"))
+        return solution
+    return replace(solution, lower_bound=min(value, length), certificate=certificate)
 
 
 def _require_limits(target_gap: float | None, time_limit: float | None) -> None:
