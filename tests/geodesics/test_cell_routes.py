@@ -132,3 +132,22 @@ def test_rays_refuse_cells_and_name_the_remedy():
     problem, _ = random_problem(1)
     with pytest.raises(tp.InputError, match=r"cost going is constant in cells; .*smooth_costs"):
         tp.plan(problem, "geodesic-traversal")
+
+
+def test_a_bend_at_a_corner_does_not_hold_up_the_others():
+    dear = 36.356933
+    costs = np.ones((5, 6))
+    costs[1:3] = costs[4] = dear
+    costs[:, 2] = 1.0
+    x, y = 0.5 * np.arange(6), 0.5 * np.arange(5)
+    flat = np.zeros_like(costs)
+    surface = tp.read_surface((flat, x, y), costs={"going": (costs, x, y)}, smoothing=None)
+    problem = tp.Problem(surface, (0.75, 0.0), (0.0, 1.853968626))
+    path = tp.refine(problem, [(0.75, 0.0), (0.75, 1.25), (0.003, 1.75), (0.0, 1.853968626)])
+
+    def length(bend):
+        """Up the side of the cheap column, over the cheap row, and through the dear row."""
+        return 1.25 + math.hypot(0.75 - bend, 0.5) + dear * math.hypot(bend, 0.103968626)
+
+    least = minimize_scalar(length, bounds=(0.0, 0.1), options={"xatol": 1e-12}).fun
+    assert least * (1.0 - 1e-9) <= path.length <= least * (1.0 + 1e-7)

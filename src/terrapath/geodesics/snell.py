@@ -40,20 +40,44 @@ def obeying_snell(surface: Surface, x: Array, y: Array, points: Array, first: in
     length = _length(surface, points)
     for _ in range(MOST_STEPS):
         step = _newton_step(surface, points, along)
-        for _ in range(MOST_HALVINGS):
-            taken = np.clip(step, low, high)
-            moved = points + along * taken[:, None]
-            shorter = _length(surface, moved)
-            if shorter < length:
-                break
-            step = 0.5 * step
-        else:
-            return points
-        points, low, high = moved, low - taken, high - taken
+        taken = _together(surface, points, along, step, low, high, length)
+        if taken is None:
+            # A bend at a corner, where the length is not smooth, must not hold up the others.
+            taken = _one_by_one(surface, points, along, step, low, high)
+        points, low, high = points + along * taken[:, None], low - taken, high - taken
+        shorter = _length(surface, points)
         gain, length = length - shorter, shorter
         if gain <= GAIN * length:
             break
     return points
+
+
+def _together(
+    surface: Surface, points: Array, along: Array, step: Array, low: Array, high: Array, most: float
+) -> Array | None:
+    """The share (m,) of a step of all bends with which the path is shorter than ``most``."""
+    for halvings in range(MOST_HALVINGS):
+        taken = np.clip(0.5**halvings * step, low, high)
+        if _length(surface, points + along * taken[:, None]) < most:
+            return np.asarray(taken)
+    return None
+
+
+def _one_by_one(
+    surface: Surface, points: Array, along: Array, step: Array, low: Array, high: Array
+) -> Array:
+    """The steps (m,) of bends that shorten the path alone, of two neighbours one at most."""
+    found = np.zeros(len(points))
+    before, middle, after = points[:-2], points[1:-1], points[2:]
+    known = segment_lengths(surface, before, middle) + segment_lengths(surface, middle, after)
+    for halvings in range(MOST_HALVINGS):
+        taken = np.clip(0.5**halvings * step, low, high)
+        moved = (points + along * taken[:, None])[1:-1]
+        length = segment_lengths(surface, before, moved) + segment_lengths(surface, moved, after)
+        for k in (np.flatnonzero(length < known) + 1).tolist():
+            if not found[k - 1 : k + 2].any():
+                found[k] = taken[k]
+    return found
 
 
 def _length(surface: Surface, points: Array) -> float:
