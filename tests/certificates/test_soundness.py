@@ -162,6 +162,8 @@ def problem_among_obstacles(random):
                 continue
 
 
+# Some of this ground is so rough that a path can be refined only in part, which is said.
+@pytest.mark.filterwarnings("ignore:a path was refined in part")
 @pytest.mark.parametrize("batch", mostly_slow(range(10), quick=2))
 def test_no_bound_is_above_any_path_among_obstacles(batch):
     gaps, found = [], 0
