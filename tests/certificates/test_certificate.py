@@ -20,7 +20,7 @@ from certificate_cases import BOUNDS, certified
 from common import FLAT
 from processes import in_another_process
 from terrapath._kernels.certificates import norms as kernels, potentials, surface_models, taylor
-from terrapath.certificates import certificate, claims
+from terrapath.certificates import certificate, claims, sides
 from terrapath.certificates.certificate import seal_of
 
 # The checker is nobody's child
@@ -73,11 +73,21 @@ def test_the_checker_shares_nothing_with_the_solver():
         "_kernels.surface.points",
         "_kernels.surface.surfaces",
         "_support.watching",
+        "certificates.sides",
         "errors",
         "problem",
         "space.lattice",
         "surface.bounds",
         "surface.layers",
+        "validation",
+    }
+    assert imports_of(sides) == {
+        "_kernels.certificates.potentials",
+        "_kernels.surface.cells",
+        "_kernels.surface.surfaces",
+        "errors",
+        "space.lattice",
+        "surface.bounds",
         "validation",
     }
     own = {"_kernels.certificates.surface_models", "_kernels.certificates.taylor"}
