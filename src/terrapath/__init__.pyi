@@ -15,6 +15,7 @@ from .errors import (
     MissingExtraError as MissingExtraError,
     OutsideSurfaceError as OutsideSurfaceError,
     RepairedWarning as RepairedWarning,
+    SnapWarning as SnapWarning,
     TerrapathError as TerrapathError,
     TerrapathWarning as TerrapathWarning,
     UnfinishedWarning as UnfinishedWarning,

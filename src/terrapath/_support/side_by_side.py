@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -18,16 +18,14 @@ def on_all_cores(work: Callable[[Part], None], parts: Sequence[Part], must_stop:
     work : runs on several threads at once, so most of it must be in kernels.
     """
     if len(parts) < 2 or cores() < 2:
-        for part in parts:
-            work(part)
-            if must_stop():
-                return False
-        return True
+        return _all_done(map(work, parts), len(parts), must_stop)
     with ThreadPoolExecutor(min(cores(), len(parts))) as pool:
         try:
-            for _ in pool.map(work, parts):
-                if must_stop():
-                    return False
+            return _all_done(pool.map(work, parts), len(parts), must_stop)
         finally:
             pool.shutdown(cancel_futures=True)
-    return True
+
+
+def _all_done(results: Iterable[None], count: int, must_stop: MustStop) -> bool:
+    """Wait for so many results; False where it must stop before the last."""
+    return all(done == count or not must_stop() for done, _ in enumerate(results, start=1))

@@ -13,7 +13,7 @@ from ..problem import Path, Problem, Solution, Status
 from ..problem.solution import LARGE_GAP
 from ..scenario.answers import goal_status
 from ..surface import Layer, Surface
-from ..surface.georeference import with_unit
+from ..surface.georeference import amount
 from ..surface.ground import is_weighted, value_unit
 from .console import percent, remark
 
@@ -46,7 +46,7 @@ def _grade(slope: float) -> str:
 def _longer(length: float, than: float, unit: str) -> str:
     """A length, and how much longer it is than the path."""
     more = length / than - 1.0 if than > 0.0 else 0.0
-    return f"{with_unit(length, unit)} ({percent(more) + ' longer' if more > 1e-9 else 'as long'})"
+    return f"{amount(length, unit)} ({percent(more) + ' longer' if more > 1e-9 else 'as long'})"
 
 
 def _point(problem: Problem, point: tuple[float, float]) -> str:
@@ -69,16 +69,16 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
     if path is None or length is None:
         return
     unit = solution.unit
-    yield "value", f"{with_unit(length, unit)}; what was minimised"
+    yield "value", f"{amount(length, unit)}; what was minimised"
     if solution.lower_bound is not None:
-        yield "lower bound", f"{with_unit(solution.lower_bound, unit)}; {solution.bound_in_words}"
+        yield "lower bound", f"{amount(solution.lower_bound, unit)}; {solution.bound_in_words}"
         yield "gap", _gap(solution, target_gap)
     yield from _on_the_ground(path)
     if solution.unrefined is not None:
         yield "planner's path", _longer(solution.unrefined.length, length, unit)
     assert solution.cost is not None
-    yield "planner's cost", with_unit(solution.cost, unit)
-    yield "straight-line length", with_unit(solution.straight_length, unit)
+    yield "planner's cost", amount(solution.cost, unit)
+    yield "straight-line length", amount(solution.straight_length, unit)
     yield from _contributions(path)
     if solution.alternatives:
         others = solution.alternatives[:MOST_ALTERNATIVES]
@@ -88,8 +88,8 @@ def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str
 def _on_the_ground(path: Path) -> Iterator[tuple[str, str]]:
     """What people ask of a route, whatever was minimised."""
     unit = path.ground_unit
-    yield "ground length", with_unit(path.ground_length, unit)
-    yield "climb, descent", f"{with_unit(path.climb, unit)}, {with_unit(path.descent, unit)}"
+    yield "ground length", amount(path.ground_length, unit)
+    yield "climb, descent", f"{amount(path.climb, unit)}, {amount(path.descent, unit)}"
     yield "steepest grade", f"{_grade(path.steepest)} along the route"
     yield "side slope", f"{_grade(path.steepest_side)} at most, across the route"
 
@@ -127,8 +127,8 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     corridor, unit = solution.corridor, solution.problem.surface.unit
     if corridor is None:
         return
-    around = with_unit(corridor.half_width, unit)
-    coarse = with_unit(corridor.coarse_length, solution.unit)
+    around = amount(corridor.half_width, unit)
+    coarse = amount(corridor.coarse_length, solution.unit)
     yield (
         "corridor",
         f"{around} on both sides of a route of {coarse}, planned on the map read "
@@ -138,7 +138,7 @@ def _corridor(solution: Solution) -> Iterator[tuple[str, str]]:
     if least is None:
         yield "elsewhere", "nothing is proven: a path there may cost less"
     else:
-        chords = with_unit(least, solution.unit)
+        chords = amount(least, solution.unit)
         verb = "costs less" if is_weighted(solution.problem.surface) else "is shorter"
         yield "elsewhere", f"no path on the map {verb} than {chords}, by chords"
 
@@ -160,7 +160,7 @@ def _fit(surface: Surface) -> Iterator[tuple[str, str]]:
         largest = _each(surface, fit.smoothing.largest_change)
         yield (
             "smoothed",
-            f"over {with_unit(fit.smoothing.scale, surface.unit)}; moved by at most {largest}; "
+            f"over {amount(fit.smoothing.scale, surface.unit)}; moved by at most {largest}; "
             f"rms {_each(surface, fit.smoothing.rms_change)}",
         )
 
@@ -191,14 +191,14 @@ def _constraints(solution: Solution) -> Iterator[tuple[str, str]]:
     if problem.obstacles:
         yield "obstacles", f"{len(problem.obstacles):,}"
     if problem.radius:
-        yield "vehicle radius", with_unit(problem.radius, unit) + ", kept from everything blocked"
+        yield "vehicle radius", amount(problem.radius, unit) + ", kept from everything blocked"
     if problem.max_slope is not None:
         limit = problem.constraints.slope_limit
         by = "by Horn's formula" if limit is not None and limit.by_horn else "at their steepest"
         steep = problem.constraints.steep
         share = 0.0 if steep is None else float(steep.blocked.mean())
         yield (
-            "steepest ground",
+            "slope limit",
             f"{problem.max_slope:g} degrees; {percent(share)} of the cells are steeper, {by}",
         )
     # In a corridor this area is the corridor, which is in the table already.
@@ -238,7 +238,7 @@ def _print_parts(heading: str, header: tuple[str, ...], rows: Iterable[tuple[str
 
 
 def _optional(value: float | None, unit: str) -> str:
-    return "-" if value is None or not np.isfinite(value) else with_unit(value, unit)
+    return "-" if value is None or not np.isfinite(value) else amount(value, unit)
 
 
 def _print_legs(solution: Solution) -> None:
@@ -262,7 +262,7 @@ def _print_legs(solution: Solution) -> None:
 def _ground_length(solution: Solution | None) -> str:
     if solution is None or solution.path is None:
         return "-"
-    return with_unit(solution.path.ground_length, solution.path.ground_unit)
+    return amount(solution.path.ground_length, solution.path.ground_unit)
 
 
 def _print_goals(goals: Iterable[GoalAnswer], unit: str) -> None:
@@ -297,7 +297,9 @@ def print_report(
     if answers := list(goals):
         _print_goals(answers, solution.unit)
     if solution.status is not Status.SOLVED:
-        remark(f"{solution.status.message} (stopped by: {solution.stopped_by})")
+        is_proven = solution.status is Status.UNREACHABLE
+        reason = solution.stopped_by if is_proven else f"stopped by: {solution.stopped_by}"
+        remark(f"{solution.status.message} ({reason})")
 
 
 def print_check(problem: Problem, certificate: Certificate, seconds: float) -> None:
@@ -309,7 +311,7 @@ def print_check(problem: Problem, certificate: Certificate, seconds: float) -> N
             ("certificate", "holds"),
             ("start", _point(problem, problem.start)),
             ("goal", _point(problem, problem.goal)),
-            ("lower bound", f"{with_unit(certificate.value, unit)}; {claim}"),
+            ("lower bound", f"{amount(certificate.value, unit)}; {claim}"),
             ("dual norm", f"at most {certificate.norm:.9g}"),
             ("cells", f"{lattice.nx - 1:,} x {lattice.ny - 1:,}"),
             ("seconds", f"{seconds:.3f}"),
@@ -327,8 +329,8 @@ def print_field(field: DistanceField, seconds: float) -> None:
         [
             ("start", _point(problem, problem.start)),
             ("nodes", f"{lattice.nx:,} x {lattice.ny:,}, {percent(field.reached)} reached"),
-            ("spacing", with_unit(max(lattice.dx, lattice.dy), unit)),
-            ("farthest", with_unit(float(reached.max(initial=0.0)), value_unit(problem.surface))),
+            ("spacing", amount(max(lattice.dx, lattice.dy), unit)),
+            ("farthest", amount(float(reached.max(initial=0.0)), value_unit(problem.surface))),
             ("seconds", f"{seconds:.3f}"),
         ]
     )

@@ -108,7 +108,8 @@ class Medium:
         )
         seeds, values = self._seeds(source, SEED_RADIUS)
         day = calendar_queue.typical_day(lattice.data, self.surface.typical_cost)
-        in_order = DAY_SHARE * self.least_edge <= day
+        # With a limit, too, so that no node within it is left out.
+        in_order = DAY_SHARE * self.least_edge <= day or math.isfinite(limit)
         if not in_order:
             day = DAY_SHARE * self.least_edge
         front = calendar_queue.front_of(count, day, values)

@@ -20,7 +20,7 @@ from .._kernels.surface.surfaces import Spline
 from .._support.watching import MustStop, never
 from ..problem import Path, Problem
 from ..surface import Surface
-from ..surface.metric import segment_lengths
+from ..surface.metric import curve_length, segment_lengths
 from ..validation import Array
 from .snell import ON_SIDE, obeying_snell
 
@@ -57,11 +57,8 @@ class CellGrid(NamedTuple):
     x: Array  # (nx + 1,): where the sides are
     y: Array
     costs: Array  # (ny, nx)
-
-    @property
-    def sides(self) -> Array:
-        """(2,): the typical lengths of sides."""
-        return np.array([np.median(np.diff(self.x)), np.median(np.diff(self.y))])
+    sides: Array  # (2,): their typical lengths
+    is_flat: bool  # no relief, and no smooth cost
 
 
 def grid_of(problem: Problem) -> CellGrid | None:
@@ -69,10 +66,12 @@ def grid_of(problem: Problem) -> CellGrid | None:
     surface, bounds = problem.surface, problem.bounds
     if surface.cost_cells is None or not isinstance(surface.data, Spline):
         return None
-    cells = surface.data.cells
+    cells, is_flat = surface.data.cells, _is_flat(surface)
     rows, columns = cells.costs.shape
-    x = _sides(bounds.x1_min, bounds.x1_max, cells.x0, cells.dx, columns, _parts(surface, cells.dx))
-    y = _sides(bounds.x2_min, bounds.x2_max, cells.y0, cells.dy, rows, _parts(surface, cells.dy))
+    # On flat ground cells stay whole.
+    longest = math.inf if is_flat else FEATURES_PER_PART * surface.resolution
+    x = _sides(bounds.x1_min, bounds.x1_max, cells.x0, cells.dx, columns, longest)
+    y = _sides(bounds.x2_min, bounds.x2_max, cells.y0, cells.dy, rows, longest)
     i, j = (
         np.clip(np.floor((0.5 * (at[1:] + at[:-1]) - origin) / step).astype(int), 0, count - 1)
         for at, origin, step, count in (
@@ -80,7 +79,8 @@ def grid_of(problem: Problem) -> CellGrid | None:
             (y, cells.y0, cells.dy, rows),
         )
     )
-    return CellGrid(x, y, cells.costs[np.ix_(j, i)])
+    sides = np.array([np.median(np.diff(x)), np.median(np.diff(y))])
+    return CellGrid(x, y, cells.costs[np.ix_(j, i)], sides, is_flat)
 
 
 def _is_flat(surface: Surface) -> bool:
@@ -92,15 +92,14 @@ def _is_flat(surface: Surface) -> bool:
     return not (np.array(reliefs) * data.weights).any()
 
 
-def _parts(surface: Surface, side: float) -> int:
-    """Into how many parts the side of a cell is cut."""
-    if _is_flat(surface):
-        return 1
-    return max(math.ceil(side / (FEATURES_PER_PART * surface.resolution) - 1e-9), 1)
+def _sides(
+    low: float, high: float, origin: float, step: float, count: int, longest: float
+) -> Array:
+    """Where the sides of cells are between two bounds, and these bounds.
 
-
-def _sides(low: float, high: float, origin: float, step: float, count: int, parts: int) -> Array:
-    """Where the sides of cells, and of their parts, are between two bounds, and these bounds."""
+    Cells are cut into parts of equal length, no longer than ``longest``.
+    """
+    parts = max(math.ceil(step / longest - 1e-9), 1)
     places = origin + step * np.arange(count * parts + 1) / parts
     inside = (places > low + ON_SIDE * step) & (places < high - ON_SIDE * step)
     return np.concatenate([[low], places[inside], [high]])
@@ -137,8 +136,8 @@ def _sides_with(problem: Problem, grid: CellGrid, points: Array) -> kernels.Side
     touched[known] = labels
     held = np.nonzero(known)[0][np.argsort(labels, kind="stable")]
     first = np.concatenate([[0], np.cumsum(np.bincount(labels, minlength=len(cells)))])
-    surface, is_flat = problem.surface, _is_flat(problem.surface)
-    heights = np.zeros((len(points), 0 if is_flat else len(surface.layers)))
+    surface = problem.surface
+    heights = np.zeros((len(points), 0 if grid.is_flat else len(surface.layers)))
     kernels.fill_heights(surface.data, points, heights)
     return kernels.Sides(
         costs=grid.costs.ravel()[cells],
@@ -148,7 +147,7 @@ def _sides_with(problem: Problem, grid: CellGrid, points: Array) -> kernels.Side
         first=first.astype(np.int64),
         held=held.astype(np.int64),
         floor=surface.least_cost,
-        is_flat=is_flat,
+        is_flat=grid.is_flat,
         has_obstacles=problem.free_space.has_obstacles,
     )
 
@@ -320,7 +319,7 @@ def _without_bends(problem: Problem, points: Array) -> Array:
     surface, space = problem.surface, problem.free_space
     moved = np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))
     points = points[moved] if moved.sum() > 1 else points[[0, -1]]
-    allowed = STRAIGHT * float(segment_lengths(surface, points[:-1], points[1:]).sum())
+    allowed = STRAIGHT * curve_length(surface, points)
     parity, unchanged = 1, 0
     while len(points) > 2 and unchanged < 2:
         k = np.arange(parity, len(points) - 1, 2)

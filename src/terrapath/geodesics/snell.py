@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.linalg import solve_banded
 
 from ..surface import Surface
-from ..surface.metric import segment_lengths
+from ..surface.metric import curve_length, segment_lengths
 from ..validation import Array
 
 # Differences are taken over this share of a side.
@@ -37,7 +37,7 @@ def obeying_snell(surface: Surface, x: Array, y: Array, points: Array, first: in
     along, low, high = _rooms(x, y, points, first)
     if not (low < high).any():
         return points
-    length = _length(surface, points)
+    length = curve_length(surface, points)
     for _ in range(MOST_STEPS):
         step = _newton_step(surface, points, along)
         taken = _together(surface, points, along, step, low, high, length)
@@ -45,7 +45,7 @@ def obeying_snell(surface: Surface, x: Array, y: Array, points: Array, first: in
             # A bend at a corner, where the length is not smooth, must not hold up the others.
             taken = _one_by_one(surface, points, along, step, low, high)
         points, low, high = points + along * taken[:, None], low - taken, high - taken
-        shorter = _length(surface, points)
+        shorter = curve_length(surface, points)
         gain, length = length - shorter, shorter
         if gain <= GAIN * length:
             break
@@ -58,7 +58,7 @@ def _together(
     """The share (m,) of a step of all bends with which the path is shorter than ``most``."""
     for halvings in range(MOST_HALVINGS):
         taken = np.clip(0.5**halvings * step, low, high)
-        if _length(surface, points + along * taken[:, None]) < most:
+        if curve_length(surface, points + along * taken[:, None]) < most:
             return np.asarray(taken)
     return None
 
@@ -78,10 +78,6 @@ def _one_by_one(
             if not found[k - 1 : k + 2].any():
                 found[k] = taken[k]
     return found
-
-
-def _length(surface: Surface, points: Array) -> float:
-    return float(segment_lengths(surface, points[:-1], points[1:]).sum())
 
 
 def _rooms(x: Array, y: Array, points: Array, first: int) -> tuple[Array, Array, Array]:

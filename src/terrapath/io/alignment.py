@@ -99,7 +99,9 @@ def _cells_onto(name: str, view: View, target: Grid, out: Array) -> None:
     """Bring the costs of cells to the target's cells: each has the cost where its centre lies."""
     values = _read(view)
     _require_costs(name, values, view.grid)
-    if not view.read_as(target, out):
+    if (order := view.order_in(target)) is not None:
+        out[order] = values
+    else:
         resample(values, view.grid, target, out, nearest=True)
 
 

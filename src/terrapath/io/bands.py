@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,23 @@ class Band(ABC):
     def scaling(self) -> tuple[float, float]:
         """The scale and the offset of its stored numbers."""
         return 1.0, 0.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Derived(Band):
+    """A band whose values are made of those of another one, read in the same blocks."""
+
+    band: Band
+
+    @property
+    def rows_at_once(self) -> int:
+        """How many rows the file stores together in one block."""
+        return self.band.rows_at_once
+
+
+def described(band: Band) -> dict[str, Any]:
+    """What is known of a band besides its values, for one that is derived from it."""
+    return {entry.name: getattr(band, entry.name) for entry in fields(Band)}
 
 
 class Part(NamedTuple):
@@ -215,14 +232,19 @@ class View:
 
         Returns False, and reads nothing, if its cells are different.
         """
-        grid = self.grid
-        if grid.crs == target.crs and grid.is_same(target):
-            self.read_into(out)
-        elif grid.crs == target.crs and grid.flipped().is_same(target):
-            self.read_into(out[::-1])
-        else:
+        if (order := self.order_in(target)) is None:
             return False
+        self.read_into(out[order])
         return True
+
+    def order_in(self, target: Grid) -> slice | None:
+        """The target's rows as they come here, if it has the same cells; None if it has others."""
+        grid = self.grid
+        if grid.crs != target.crs:
+            return None
+        if grid.is_same(target):
+            return slice(None)
+        return slice(None, None, -1) if grid.flipped().is_same(target) else None
 
     def read_into(self, out: Array) -> None:
         """Read the values of the grid's cells into ``out`` (rows, columns)."""

@@ -23,7 +23,7 @@ from .._support.external import (
 from ..errors import InputError, MapError, MapWarning, tell
 from ..surface.georeference import LENGTH_UNITS, metres_of, parse_crs
 from ..validation import Array, require_no_pipe, require_not_negative, require_positive
-from .bands import MOST_CELLS, Band
+from .bands import MOST_CELLS, Band, Derived, described
 from .rasters import open_band, reading
 
 if TYPE_CHECKING:
@@ -229,17 +229,11 @@ LOCAL = "none"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Stretched(Band):
+class Stretched(Derived):
     """Heights of a picture: its numbers, from 0 to the largest that fits, as low to high."""
 
-    band: Band
     low: float
     scale: float
-
-    @property
-    def rows_at_once(self) -> int:
-        """How many rows the file stores together in one block."""
-        return self.band.rows_at_once
 
     def read(self, rows: slice, columns: slice) -> Array:
         """Heights (rows, columns), NaN where there is no data."""
@@ -344,10 +338,7 @@ def _stretched(band: Band, low: float, high: float) -> Band:
             "bits, so nothing says which is the highest; leave it out, or convert the picture"
         )
     scale = (high - low) / band.largest
-    return Stretched(
-        grid=band.grid, label=band.label, unit=band.unit, step=scale, band=band, low=low,
-        scale=scale,
-    )  # fmt: skip
+    return Stretched(**{**described(band), "step": scale}, band=band, low=low, scale=scale)
 
 
 def _with_unit(band: Band, unit: str) -> Band:

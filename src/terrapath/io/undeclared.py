@@ -7,7 +7,7 @@ the sea floor passes through -9999 on a slope.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..errors import MapWarning, tell
 from ..surface.georeference import metres_of
 from ..surface.neighbours import grown
 from ..validation import Array
-from .bands import DEPTH, USUAL, Band, View
+from .bands import DEPTH, USUAL, Band, Derived, View, described
 from .sources import NoData
 
 Cells: TypeAlias = npt.NDArray[np.bool_]
@@ -56,16 +56,10 @@ class Finding(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class WithoutFills(Band):
+class WithoutFills(Derived):
     """A band in which further values are no data. ranges : (low, high) of each."""
 
-    band: Band
     ranges: tuple[tuple[float, float], ...]
-
-    @property
-    def rows_at_once(self) -> int:
-        """How many rows the file stores together in one block."""
-        return self.band.rows_at_once
 
     @property
     def scaling(self) -> tuple[float, float]:
@@ -84,8 +78,7 @@ def without(band: Band, *ranges: tuple[float, float]) -> Band:
     """The band, with the values in these ranges as no data."""
     if not ranges:
         return band
-    own = {entry.name: getattr(band, entry.name) for entry in fields(Band)}
-    return WithoutFills(**own, band=band, ranges=ranges)
+    return WithoutFills(**described(band), band=band, ranges=ranges)
 
 
 def of_value(value: float) -> tuple[float, float]:

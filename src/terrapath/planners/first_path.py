@@ -48,10 +48,10 @@ def path_over_lattices(
     straight : the straight line where that is free; the shorter path counts. The coarse lattice
     takes a moment, so only the others show their progress.
     """
-    spacing: float | None = coarse_spacing(problem, is_rough)
-    if is_rough and min(problem.default_spacing) >= 0.5 * coarse_spacing(problem, is_rough):
-        spacing = None  # nodes where the samples are, which is best on rough ground
-    coarse = AStar(spacing=spacing, neighbours=NEIGHBOURS)
+    spacing = coarse_spacing(problem, is_rough)
+    # Nodes where the samples are, which is best on rough ground, unless they are far too many.
+    at_samples = is_rough and min(problem.default_spacing) >= 0.5 * spacing
+    coarse = AStar(spacing=None if at_samples else spacing, neighbours=NEIGHBOURS)
     found = coarse.solve(problem, time_limit=options.time_limit)
     seconds = found.seconds
 

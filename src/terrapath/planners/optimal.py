@@ -11,7 +11,6 @@ from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
 from ..errors import tell_unfinished
 from ..geodesics.alternatives import is_same, routes_of_fields, shortest
-from ..geodesics.cell_routes import shortest_through_cells
 from ..geodesics.refinement import refine
 from ..geodesics.visibility import is_flat, shortest_taut_path
 from ..problem import Path, Problem, Solution, Status
@@ -195,13 +194,14 @@ class _Run:
 
     def try_corners(self) -> None:
         """The exact shortest path on flat ground."""
-        taut = shortest_taut_path(self.problem, watch=self.must_stop)
-        if taut.path is not None:
+        if (path := shortest_taut_path(self.problem, watch=self.must_stop).path) is not None:
             self.is_exact = not self.problem.free_space.circles
-            self.refine(taut.path)
+            self.refine(path)
 
     def try_sides(self) -> None:
         """The shortest path through points on the sides of cost cells; fields show others."""
+        from ..geodesics.cell_routes import shortest_through_cells
+
         if (path := shortest_through_cells(self.problem, self.must_stop)) is not None:
             self.is_through_cells = True
             self.keep_unrefined(path)

@@ -208,11 +208,11 @@ def draw_ground(
 
 
 def _emptiest_corner(solution: Solution) -> str:
-    """The corner that is farthest from the path and its ends, as matplotlib names it."""
+    """The corner that is farthest from start, goal and all routes, as matplotlib names it."""
     problem = solution.problem
     shown = [problem.start, problem.goal]
-    if solution.path is not None:
-        shown.extend(solution.path.points.tolist())
+    for path in (solution.path, *solution.alternatives):
+        shown.extend([] if path is None else path.points.tolist())
     x_min, x_max, y_min, y_max = _extent(problem)
     places = (np.array(shown) - [x_min, y_min]) / [x_max - x_min, y_max - y_min]
     clear = {name: np.hypot(*(places - at).T).min() for name, at in CORNERS.items()}

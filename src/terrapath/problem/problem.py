@@ -21,7 +21,7 @@ from .path import Path
 
 if TYPE_CHECKING:
     from ..space.constraints import Area, Constraints
-    from ..space.slope_limit import SlopeLimit, SlopeMeasure
+    from ..space.slope_limit import SlopeMeasure
 
 
 def as_text(point: Point) -> str:
@@ -97,28 +97,16 @@ class Problem:
     @cached_property
     def constraints(self) -> Constraints:
         """All that limits where a path may go, as it was given."""
-        from ..space.constraints import Constraints, outside_of
+        from ..space.constraints import Constraints
 
-        outside = None
-        if self.keep_in is not None:
-            outside = outside_of(self.keep_in, self.bounds, self.radius)
-        return Constraints(
-            bounds=self.bounds,
-            obstacles=self.obstacles,
-            nodata=self.surface.nodata,
-            slope_limit=self._slope_limit(),
-            outside=outside,
+        return Constraints.of(
+            self.surface,
+            self.bounds,
+            self.obstacles,
             radius=self.radius,
-        )
-
-    def _slope_limit(self) -> SlopeLimit | None:
-        if self.max_slope is None:
-            return None
-        from ..space.slope_limit import SlopeLimit
-
-        # Steep ground just beyond the bounds also keeps the vehicle away.
-        return SlopeLimit(
-            self.surface, self.max_slope, self.bounds.widened(self.radius), self.slope_measure
+            max_slope=self.max_slope,
+            slope_measure=self.slope_measure,
+            keep_in=self.keep_in,
         )
 
     @staticmethod

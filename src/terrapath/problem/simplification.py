@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.surface.surfaces import Spline
 from ..space.free_space import FreeSpace
 from ..surface import Surface, metric
 from ..validation import Array
@@ -34,8 +33,8 @@ def default_tolerance(problem: Problem) -> float:
 def cell_size(problem: Problem) -> float:
     """A cell of the map, map units; where there are no cells, the finest feature."""
     surface, size = problem.surface, problem.surface.resolution
-    if isinstance(surface.data, Spline) and surface.fit.smoothing is not None:
-        size = min(size, surface.data.dx, surface.data.dy)  # features are larger than cells
+    if surface.cells is not None and surface.fit.smoothing is not None:
+        size = min(size, surface.cells.dx, surface.cells.dy)  # features are larger than cells
     return size if math.isfinite(size) else min(problem.default_spacing)
 
 

@@ -37,7 +37,7 @@ _MESSAGES = {
     Status.SOLVED: "a path was found",
     Status.NOT_FOUND: "no path was found within the limits: the goal may be enclosed, or more "
     "samples, a longer time limit or another step may find one",
-    Status.UNREACHABLE: "no path exists: what may not be entered encloses the start or the goal",
+    Status.UNREACHABLE: "no path exists",
     Status.INTERRUPTED: "stopped by the user; the path, if any, is the best so far",
 }
 

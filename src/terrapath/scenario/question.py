@@ -235,17 +235,21 @@ class OwnCoordinates:
 
     def __call__(self, point: Point) -> str:
         """As (X, Y), or (latitude, longitude) to a centimetre."""
+        from ..problem.problem import as_text
+
         reference, place = self.reference, np.array(point)
         if reference is not None and self.latlon:
             longitude, latitude = reference.to_lonlat(place)
             return f"({latitude:.7f}, {longitude:.7f})"
         if reference is not None and not reference.is_map_crs:
             place = reference.to_map(place)
-        return f"({place[0]:.10g}, {place[1]:.10g})"
+        return as_text((float(place[0]), float(place[1])))
 
 
 def _shown(name: str, point: Point) -> str:
-    return f"{name}=({point[0]:.10g}, {point[1]:.10g})"
+    from ..problem.problem import as_text
+
+    return f"{name}={as_text(point)}"
 
 
 def _from_latlon(surface: Surface, point: Point, name: str) -> Point:

@@ -131,23 +131,17 @@ def _given(limits: ConstraintsSection, file: Path) -> dict[tuple[str, str], str]
 def _free_space(surface: Surface, bounds: Bounds, limits: ConstraintsSection) -> FreeSpace:
     """Where the vehicle's centre may be."""
     from ..io import read_area, read_obstacles
-    from ..space.constraints import Constraints, outside_of
-    from ..space.slope_limit import SlopeLimit
+    from ..space.constraints import Constraints
 
     require_not_negative(radius=limits.radius)
-    steepest = outside = None
-    if limits.max_slope is not None:
-        around = bounds.widened(limits.radius)
-        steepest = SlopeLimit(surface, limits.max_slope, around, limits.slope_measure)
-    if limits.keep_in is not None:
-        outside = outside_of(read_area(limits.keep_in, surface), bounds, limits.radius)
-    return Constraints(
-        bounds=bounds,
-        obstacles=tuple(o for name in limits.obstacles for o in read_obstacles(name, surface)),
-        nodata=surface.nodata,
-        slope_limit=steepest,
-        outside=outside,
+    return Constraints.of(
+        surface,
+        bounds,
+        tuple(shape for name in limits.obstacles for shape in read_obstacles(name, surface)),
         radius=limits.radius,
+        max_slope=limits.max_slope,
+        slope_measure=limits.slope_measure,
+        keep_in=None if limits.keep_in is None else read_area(limits.keep_in, surface),
     ).free_space()
 
 

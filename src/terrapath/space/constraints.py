@@ -12,13 +12,13 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from ..errors import InputError
-from ..surface import Mask
+from ..surface import Mask, Surface
 from ..surface.bounds import Bounds
 from ..validation import Point
 from .free_space import Circle, FreeSpace, Geometries, Obstacle, are_points, sort_obstacles
 
 if TYPE_CHECKING:
-    from .slope_limit import SlopeLimit
+    from .slope_limit import SlopeLimit, SlopeMeasure
 
 # An area to keep in: shapely polygons.
 Area: TypeAlias = BaseGeometry | Iterable[BaseGeometry]
@@ -40,6 +40,36 @@ class Constraints:
     slope_limit: SlopeLimit | None = None
     outside: BaseGeometry | None = None
     radius: float = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        surface: Surface,
+        bounds: Bounds,
+        obstacles: tuple[Obstacle, ...],
+        *,
+        radius: float = 0.0,
+        max_slope: float | None = None,
+        slope_measure: SlopeMeasure = "horn",
+        keep_in: Area | None = None,
+    ) -> Constraints:
+        """Those on a surface; the arguments are those of ``Problem``."""
+        steepest = outside = None
+        if max_slope is not None:
+            from .slope_limit import SlopeLimit
+
+            # Steep ground just beyond the bounds also keeps the vehicle away.
+            steepest = SlopeLimit(surface, max_slope, bounds.widened(radius), slope_measure)
+        if keep_in is not None:
+            outside = outside_of(keep_in, bounds, radius)
+        return cls(
+            bounds=bounds,
+            obstacles=obstacles,
+            nodata=surface.nodata,
+            slope_limit=steepest,
+            outside=outside,
+            radius=radius,
+        )
 
     @property
     def steep(self) -> Mask | None:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ..surface import Surface
 from ..surface.carrying import Native, few_rows, heights_at, sampled
 from ..surface.holes import continue_into_holes
+from ..surface.layers import at_knots
 from ..surface.places import Places
 from ..surface.raster import Grid
 from ..validation import Array
@@ -41,12 +42,6 @@ def _filtered(array: Array, weights: Array) -> Array:
         if used[k] != 0.0:
             total += used[k] * array[k : k + count]
     return np.asarray(total)
-
-
-def _at_knots(coefficients: Array) -> Array:
-    """The values at the knots of a spline with these coefficients: (n + 2, m + 2) -> (n, m)."""
-    weights = _basis(0.0)[0]
-    return _filtered(_filtered(coefficients.T, weights).T, weights)
 
 
 # Horn's formula
@@ -95,7 +90,7 @@ class HornRows:
     def __call__(self, first: int, last: int) -> Array:
         """(last - first, nx)."""
         low, high = max(first - 1, 0), min(last + 1, len(self.coefficients) - 2)
-        heights = _at_knots(self.coefficients[low : high + 2])
+        heights = at_knots(self.coefficients[low : high + 2])
         if self.missing is not None:
             heights[self.missing[low:high]] = np.nan
         across, along = rises(heights, first - low, last - low)
@@ -242,7 +237,7 @@ class SplineRows:
 
     def _of_heights(self, first: int, last: int) -> Array:
         """Horn's formula, and the differences of the neighbours, from the heights at the knots."""
-        heights = _at_knots(self._rows(first, last)[0])
+        heights = at_knots(self._rows(first, last)[0])
         ends = (int(first == 0), int(last == len(self.coefficients) - 2))
         h = np.pad(heights, (ends, (1, 1)), mode="reflect", reflect_type="odd")
         across, along = 0.5 * (h[:, 2:] - h[:, :-2]) / self.dx, 0.5 * (h[2:] - h[:-2]) / self.dy

@@ -13,7 +13,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from .._kernels.surface.carrying import add_extended, fill_differences
 from .._kernels.surface.surfaces import Spline
@@ -23,9 +22,9 @@ from .fitting import interpolate
 from .holes import Cells
 from .layers import Kind
 from .neighbours import bilinear
-from .places import Places
+from .places import Places, cells_along
 from .plane import steps_on_plane
-from .raster import SAME_PLACE, Grid, Raster
+from .raster import Grid, Raster
 from .surface import Surface
 
 # The grid on the plane is so many times finer than the map's cells. With one correction heights of
@@ -108,19 +107,12 @@ def _without_data(missing: Cells | None, grid: Grid, plane: Grid) -> Cells:
     places, found = Places(grid, plane), np.empty((plane.rows, plane.columns), np.bool_)
     for rows in few_rows(plane):
         column, row = places.of_rows(rows)
-        i, inside_columns = _cells_along(column, grid.columns)
-        j, inside_rows = _cells_along(row, grid.rows)
+        i, inside_columns = cells_along(column, grid.columns)
+        j, inside_rows = cells_along(row, grid.rows)
         found[rows] = ~(inside_rows & inside_columns)
         if missing is not None:
             found[rows] |= missing[j, i]
     return found
-
-
-def _cells_along(at: Array, count: int) -> tuple[npt.NDArray[np.intp], Cells]:
-    """The nearest of ``count`` cells along an axis, and whether a place lies in it."""
-    nearest = np.rint(np.nan_to_num(at, nan=-1.0)).astype(np.intp)
-    is_inside = np.abs(at + 0.5 - 0.5 * count) <= 0.5 * count + SAME_PLACE
-    return np.clip(nearest, 0, count - 1), np.asarray(is_inside)
 
 
 def _trimmed(plane: Grid, blocked: Cells) -> tuple[Grid, Cells]:
@@ -231,7 +223,7 @@ def _carry_cells(costs: Array, grid: Grid, fine: Grid, out: Array) -> None:
     places = Places(grid, fine)
     for rows in few_rows(fine):
         column, row = places.of_rows(rows)
-        out[rows] = costs[_cells_along(row, grid.rows)[0], _cells_along(column, grid.columns)[0]]
+        out[rows] = costs[cells_along(row, grid.rows)[0], cells_along(column, grid.columns)[0]]
 
 
 _CARRIERS: dict[Kind, Callable[[Array, Grid, Grid, Array], None]] = {

@@ -40,7 +40,7 @@ def metres_of(unit: str) -> float | None:
     return LENGTH_UNITS.get(unit.strip().lower())
 
 
-def with_unit(value: float, unit: str) -> str:
+def amount(value: float, unit: str) -> str:
     """A number with its unit: three digits after the point from 1,000 on, six below."""
     digits = ",.3f" if abs(value) >= 1000.0 else ".6f"
     return f"{value:{digits}} {unit}".rstrip()

@@ -170,9 +170,10 @@ def typical_cost(data: Peaks | Spline) -> float:
     return math.exp(math.fsum(float(logs.mean()) for logs in _logs(data)))
 
 
-def _at_knots(coefficients: Array) -> Array:
-    """Values (layers, ny, nx) of a spline at its knots."""
-    c = (coefficients[:, :-2] + 4.0 * coefficients[:, 1:-1] + coefficients[:, 2:]) / 6.0
+def at_knots(coefficients: Array) -> Array:
+    """Values (..., ny, nx) at its knots of a spline with coefficients (..., ny + 2, nx + 2)."""
+    c = coefficients[..., :-2, :] + 4.0 * coefficients[..., 1:-1, :] + coefficients[..., 2:, :]
+    c = c / 6.0
     return np.asarray((c[..., :-2] + 4.0 * c[..., 1:-1] + c[..., 2:]) / 6.0)
 
 
@@ -185,7 +186,7 @@ def limited(logs: Spline) -> Spline:
     """
     from scipy.ndimage import maximum_filter, minimum_filter
 
-    values = _at_knots(logs.coefficients)
+    values = at_knots(logs.coefficients)
     around = np.pad(values, ((0, 0), (1, 1), (1, 1)), mode="edge")
     low = minimum_filter(around, size=(1, 3, 3), mode="nearest")
     high = maximum_filter(around, size=(1, 3, 3), mode="nearest")

@@ -5,16 +5,24 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 from numpy.polynomial import chebyshev
 
 from ..validation import Array
 from .georeference import transformer
-from .raster import Grid
+from .raster import SAME_PLACE, Grid
 
 # Coordinates are interpolated between so many nodes on a side, the fewest that are right to so many
 # cells at other places, in a twentieth of the time. Where none are, as beside a pole, each is
 # transformed.
 NODES, CHECKED, CLOSE = (8, 16, 32), 9, 1e-7
+
+
+def cells_along(at: Array, count: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """The nearest of ``count`` cells along an axis, and whether a place lies in it."""
+    nearest = np.rint(np.nan_to_num(at, nan=-1.0)).astype(np.intp)
+    is_inside = np.abs(at + 0.5 - 0.5 * count) <= 0.5 * count + SAME_PLACE
+    return np.clip(nearest, 0, count - 1), np.asarray(is_inside)
 
 
 class Places:

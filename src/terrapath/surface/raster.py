@@ -281,15 +281,6 @@ class Raster:
         """Is it in degrees, rotated or distorted, so that it must be warped before planning?"""
         return self.grid.needs_warp
 
-    def _missing(self) -> Cells:
-        """Cells where any layer has no data."""
-        from .holes import missing_cells
-
-        missing = missing_cells(self.bands[0])
-        for band in self.bands[1:]:
-            missing |= missing_cells(band)
-        return missing
-
     def _georeference(self) -> Georeference | None:
         plane = self.grid.plane
         return None if plane is None else Georeference(plane, self.map_crs or self.crs or plane)
@@ -323,9 +314,9 @@ class Raster:
         """
         from .holes import continue_into_holes, fill_small_holes, missing_cells
 
-        if self._missing().all():
-            raise MapError("the map holds no data at all: every cell is no-data")
         gaps = [missing_cells(band) for band in self.bands]
+        if np.logical_or.reduce(gaps).all():
+            raise MapError("the map holds no data at all: every cell is no-data")
         for band, kind, missing in zip(self.bands, kinds, gaps, strict=True):
             if not missing.any():
                 continue
@@ -379,7 +370,8 @@ class Raster:
                 return carried_surface(raster, kinds, blocked, unknown, make)
             x, y = raster.grid.centres()
             nodata = None if blocked is None or not blocked.any() else Mask(blocked, x, y)
-            return replace(make(raster.bands, x, y, nodata=nodata), unknown=unknown)
+            surface = make(raster.bands, x, y, nodata=nodata)
+            return surface if unknown is None else replace(surface, unknown=unknown)
         except MemoryError:
             rows, columns = raster.bands.shape[1:]
             raise InputError(

@@ -12,8 +12,8 @@ from ..validation import Array
 from .fitting import interpolate
 from .holes import continue_into_holes, missing_cells
 from .neighbours import bilinear
-from .places import Places
-from .raster import SAME_PLACE, Grid
+from .places import Places, cells_along
+from .raster import Grid
 
 LEAST_FOR_SPLINE = 4  # cells on a side that a spline needs
 
@@ -60,25 +60,21 @@ def resample(
     continue_into_holes(values, missing)
     linear = linear or min(values.shape) < LEAST_FOR_SPLINE
     spline = None if linear or nearest else _spline_through(values)
-    last = np.array(values.shape) - 1
     places = Places(source, target)
     for rows in blocks(target.rows, target.columns):
         column, row = places.of_rows(rows)
         with np.errstate(invalid="ignore"):
-            inside = (np.abs(column - 0.5 * last[1]) <= 0.5 * last[1] + 0.5 + SAME_PLACE) & (
-                np.abs(row - 0.5 * last[0]) <= 0.5 * last[0] + 0.5 + SAME_PLACE
-            )
-        column, row = column[inside], row[inside]
-        cell = [
-            np.clip(np.rint(c).astype(int), 0, m) for c, m in zip((row, column), last, strict=True)
-        ]
+            i, is_in_columns = cells_along(column, source.columns)
+            j, is_in_rows = cells_along(row, source.rows)
+        inside = is_in_columns & is_in_rows
+        column, row, cell = column[inside], row[inside], (j[inside], i[inside])
         if nearest:
-            sampled = values[cell[0], cell[1]]
+            sampled = values[cell]
         elif spline is None:
             sampled = bilinear(values, row, column)
         else:
             sampled = _spline_at(spline, column, row, (values.shape[0], values.shape[1]))
-        sampled[missing[cell[0], cell[1]]] = np.nan
+        sampled[missing[cell]] = np.nan
         block = np.full(inside.shape, np.nan)
         block[inside] = sampled
         out[rows] = block

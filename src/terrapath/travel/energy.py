@@ -26,15 +26,8 @@ def minetti(mass: float | None = None) -> TravelModel:
     Source: Minetti, Moia, Roi, Susta and Ferretti (2002), Energy cost of walking and running at
     extreme uphill and downhill slopes, Journal of Applied Physiology 93, 1039-1046.
     """
-    return travel_model(
-        "minetti",
-        partial(_per_mass, MINETTI, _mass(mass)),
-        unit=_unit(mass),
-        source="Minetti et al. (2002), Journal of Applied Physiology 93, 1039-1046",
-        grades=(-0.45, 0.45),
-        distance="slope",
-        options={"mass": mass},
-    )
+    source = "Minetti et al. (2002), Journal of Applied Physiology 93, 1039-1046"
+    return _polynomial("minetti", MINETTI, mass, source)
 
 
 def llobera_sluckin(mass: float | None = None) -> TravelModel:
@@ -49,26 +42,25 @@ def llobera_sluckin(mass: float | None = None) -> TravelModel:
     Source: Llobera and Sluckin (2007), Zigzagging: theoretical insights on climbing strategies,
     Journal of Theoretical Biology 249, 206-217.
     """
+    source = "Llobera and Sluckin (2007), Journal of Theoretical Biology 249, 206-217"
+    return _polynomial("llobera_sluckin", LLOBERA_SLUCKIN, mass, source)
+
+
+def _polynomial(
+    name: str, coefficients: tuple[float, ...], mass: float | None, source: str
+) -> TravelModel:
+    """A model by a polynomial in J per kg and metre of slope distance, of a walker of this mass."""
+    if mass is not None:
+        require_positive(mass=mass)
     return travel_model(
-        "llobera_sluckin",
-        partial(_per_mass, LLOBERA_SLUCKIN, _mass(mass)),
-        unit=_unit(mass),
-        source="Llobera and Sluckin (2007), Journal of Theoretical Biology 249, 206-217",
+        name,
+        partial(_per_mass, coefficients, 1.0 if mass is None else mass),
+        unit="J/kg" if mass is None else "J",
+        source=source,
         grades=(-0.45, 0.45),
         distance="slope",
         options={"mass": mass},
     )
-
-
-def _mass(mass: float | None) -> float:
-    if mass is None:
-        return 1.0
-    require_positive(mass=mass)
-    return mass
-
-
-def _unit(mass: float | None) -> str:
-    return "J/kg" if mass is None else "J"
 
 
 def _per_mass(coefficients: tuple[float, ...], mass: float, grades: Array) -> Array:

@@ -49,11 +49,17 @@ def clamped(k, count):
 
 
 @inner_kernel
+def touched(low, high, count):
+    """The first and the last of so many cells that hold or touch [low, high], given in cells."""
+    first, last = math.floor(low - ON_SIDE), math.floor(high + ON_SIDE)
+    return clamped(first, count), clamped(last, count)
+
+
+@inner_kernel
 def lowest(cells, s, t):
     """The lowest cost of the cells that hold or touch a place, given in cells."""
     ny, nx = cells.costs.shape
-    i0, i1 = clamped(math.floor(s - ON_SIDE), nx), clamped(math.floor(s + ON_SIDE), nx)
-    j0, j1 = clamped(math.floor(t - ON_SIDE), ny), clamped(math.floor(t + ON_SIDE), ny)
+    (i0, i1), (j0, j1) = touched(s, s, nx), touched(t, t, ny)
     c = cells.costs
     return min(c[j0, i0], c[j0, i1], c[j1, i0], c[j1, i1])
 
@@ -113,24 +119,6 @@ def mean_in_cells(cells, ax, ay, bx, by):
     return total
 
 
-@inner_kernel
-def nearest_columns(cells, low, high):
-    """The first and the last column of the cells that hold or touch [low, high] along x1."""
-    nx = cells.costs.shape[1]
-    first = math.floor((low - cells.x0) / cells.dx - ON_SIDE)
-    last = math.floor((high - cells.x0) / cells.dx + ON_SIDE)
-    return clamped(first, nx), clamped(last, nx)
-
-
-@inner_kernel
-def nearest_rows(cells, low, high):
-    """The first and the last row of the cells that hold or touch [low, high] along x2."""
-    ny = cells.costs.shape[0]
-    first = math.floor((low - cells.y0) / cells.dy - ON_SIDE)
-    last = math.floor((high - cells.y0) / cells.dy + ON_SIDE)
-    return clamped(first, ny), clamped(last, ny)
-
-
 @kernel
 def least_inside(cells, x0, x1, y0, y1):
     """The lowest cost of the cells that hold a part of a box; 1 where there are none.
@@ -164,8 +152,9 @@ def range_in_box(cells, x0, x1, y0, y1):
     """The costs of the cells that hold or touch a closed box; 1 where there are none."""
     if not any_cells(cells):
         return Range(1.0, 1.0)
-    i0, i1 = nearest_columns(cells, x0, x1)
-    j0, j1 = nearest_rows(cells, y0, y1)
+    ny, nx = cells.costs.shape
+    i0, i1 = touched((x0 - cells.x0) / cells.dx, (x1 - cells.x0) / cells.dx, nx)
+    j0, j1 = touched((y0 - cells.y0) / cells.dy, (y1 - cells.y0) / cells.dy, ny)
     low, high = math.inf, 0.0
     for j in range(j0, j1 + 1):
         for i in range(i0, i1 + 1):

@@ -39,10 +39,10 @@ def write(route: Route, file: Path) -> None:
     solution, path = route.solution, route.path
     document = gpx.GPX()
     document.creator = f"terrapath {__version__}"
-    names = ["start", *(f"via {k}" for k in range(1, len(solution.via) + 1)), "goal"]
     stops = _places(path, solution.stops)
     document.waypoints = [
-        gpx.GPXWaypoint(name=name, **place) for name, place in zip(names, stops, strict=True)
+        gpx.GPXWaypoint(name=name, **place)
+        for name, place in zip(route.stop_names, stops, strict=True)
     ]
     description = route.description
     if height_metres(path.surface) is None:

@@ -44,10 +44,9 @@ def _geometries(route: Route) -> list[Any]:
 
 def write(route: Route, file: Path) -> None:
     """Write the route with its numbers, and start, via points and goal."""
-    via, numbers = len(route.solution.via), summary(route)
-    name = clean(route.solution.problem.name) or "route"
-    names = [name, "start", *(f"via {k}" for k in range(1, via + 1)), "goal"]
-    texts = [route.description, *[""] * (via + 2)]
+    numbers = summary(route)
+    names = [clean(route.solution.problem.name) or "route", *route.stop_names]
+    texts = [route.description, *[""] * len(route.stop_names)]
     columns = {"Name": np.array(names, object), "Description": np.array(texts, object)}
     only_route = np.arange(len(names)) > 0
     for key in NUMBERS:

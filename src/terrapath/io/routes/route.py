@@ -12,7 +12,7 @@ import numpy as np
 from ...problem import Path, Solution
 from ...problem.path import Indices
 from ...problem.simplification import cell_size, default_tolerance, simplified
-from ...surface.georeference import with_unit
+from ...surface.georeference import amount
 from ...validation import Array, require_not_negative
 
 
@@ -54,6 +54,12 @@ class Route:
         return np.asarray(self.path.profile.points[self.samples])
 
     @property
+    def stop_names(self) -> list[str]:
+        """What the start, the via points and the goal are called."""
+        vias = range(1, len(self.solution.via) + 1)
+        return ["start", *(f"via {k}" for k in vias), "goal"]
+
+    @property
     def facts(self) -> dict[str, Any]:
         """What was done to the points."""
         return {
@@ -67,17 +73,17 @@ class Route:
         """The route in words, for formats that have no columns for numbers."""
         solution, path = self.solution, self.path
         text = (
-            f"{with_unit(path.ground_length, path.ground_unit)} on the ground, "
-            f"climb {with_unit(path.climb, path.ground_unit)}, "
-            f"descent {with_unit(path.descent, path.ground_unit)}, "
+            f"{amount(path.ground_length, path.ground_unit)} on the ground, "
+            f"climb {amount(path.climb, path.ground_unit)}, "
+            f"descent {amount(path.descent, path.ground_unit)}, "
             f"steepest grade {100.0 * path.steepest:.3g} %, "
             f"steepest side slope {100.0 * path.steepest_side:.3g} %; "
-            f"minimised: {with_unit(path.length, solution.unit)}"
+            f"minimised: {amount(path.length, solution.unit)}"
         )
         if solution.lower_bound is not None:
-            bound = with_unit(solution.lower_bound, solution.unit)
+            bound = amount(solution.lower_bound, solution.unit)
             text += f", {solution.bound_in_words} than {bound}, gap {solution.gap_in_words}"
         if self.tolerance:
-            near = with_unit(self.tolerance, path.surface.unit)
+            near = amount(self.tolerance, path.surface.unit)
             text += f"; points are within {near} of the route"
         return f"{text}; {solution.planner}, seed {solution.seed}"
