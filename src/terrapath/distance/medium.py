@@ -108,19 +108,22 @@ class Medium:
         )
         seeds, values = self._seeds(source, SEED_RADIUS)
         day = calendar_queue.typical_day(lattice.data, self.surface.typical_cost)
-        # With a limit, too, so that no node within it is left out.
-        in_order = DAY_SHARE * self.least_edge <= day or math.isfinite(limit)
+        in_order = DAY_SHARE * self.least_edge <= day
         if not in_order:
             day = DAY_SHARE * self.least_edge
+        # Out of order, a day is settled wholly, so that no node within the limit is left out.
+        last = float(limit) if in_order else limit + day
         front = calendar_queue.front_of(count, day, values)
         state.tau[seeds] = float(self.surface.cost(np.asarray(source)))
         hopf_lax.plant(front, state, seeds, values)
         settled, chunk = 0, CHUNK
         while chunk == CHUNK:
-            chunk = hopf_lax.march(self.data, front, state, begin, CHUNK, float(limit), in_order)
+            chunk = hopf_lax.march(self.data, front, state, begin, CHUNK, last, in_order)
             settled += chunk
             if watch is not None and watch(settled):
                 break
+        for known in (state.tau, front.u):
+            known[front.u > limit] = math.inf
         shape = (lattice.ny, lattice.nx)
         return front.u.reshape(shape), state.tau.reshape(shape)
 
