@@ -8,6 +8,8 @@ from rasterio import Affine
 import terrapath as tp
 from common import REAL_MAPS
 from rasters import write
+from terrapath.space.lattice import Spacing, default_spacing
+from terrapath.surface.bounds import Bounds
 
 SRTM = REAL_MAPS / "srtm_oetztal.tif"
 
@@ -143,6 +145,23 @@ def test_nodes_are_as_many_as_the_maps_cells(tmp_path):
         spacing = problem.default_spacing
         nodes = surface.bounds.width / spacing.x * surface.bounds.height / spacing.y
         assert nodes == pytest.approx(heights.size, rel=0.05)
+
+
+def test_more_than_a_thousand_cells_in_degrees_get_no_more_nodes_than_squares(tmp_path):
+    heights = np.zeros((1100, 1100))
+    transform = Affine(SECOND, 0.0, 11.0, 0.0, -SECOND, 47.0)
+    surface = tp.read_surface(write(tmp_path / "dem.tif", heights, transform, "EPSG:4326"))
+    bounds = surface.bounds
+    spacing = default_spacing(bounds, Spacing(surface.cells.dx, surface.cells.dy))
+    assert spacing.y / spacing.x == pytest.approx(surface.cells.dy / surface.cells.dx)
+    nodes = bounds.width / spacing.x * bounds.height / spacing.y
+    assert nodes == pytest.approx(1000 * 1000 * bounds.width / bounds.height, rel=1e-9)
+
+
+def test_a_map_with_long_cells_keeps_its_nodes():
+    # 200 x 200 cells of 100 : 1; by the longer side alone it would have 100 nodes a side.
+    spacing = default_spacing(Bounds(0.0, 0.0, 20_000.0, 200.0), Spacing(100.0, 1.0))
+    assert spacing == pytest.approx((80.0, 0.8))
 
 
 def test_a_small_map_in_degrees_is_read_and_a_smaller_one_refused_with_its_own_numbers(tmp_path):

@@ -36,15 +36,17 @@ def as_spacing(spacing: float | Spacing) -> Spacing:
 
 
 def default_spacing(bounds: Bounds, features: Spacing) -> Spacing:
-    """The default spacing of nodes. features : the size of the finest ones."""
-    if features.x == features.y:
-        side, unit = max(bounds.width, bounds.height), Spacing(1.0, 1.0)
-        finest = features.x
-    else:  # in units of features
-        side, unit = max(bounds.width / features.x, bounds.height / features.y), features
-        finest = 1.0
-    share = max(min(side / NODES_PER_SIDE, finest), side / MOST_NODES_PER_SIDE)
-    return Spacing(share * unit.x, share * unit.y)
+    """The default spacing of nodes. features : the size of the finest ones.
+
+    Where features are longer along one axis, nodes are as much farther apart there, and no more of
+    them are laid than with square features of the same area.
+    """
+    stretch = 1.0 if features.x == features.y else math.sqrt(features.x / features.y)
+    finest, longer = features.x / stretch, max(bounds.width, bounds.height)
+    # A side that has a stretch is measured in it: the longer one still has NODES_PER_SIDE.
+    side = max(bounds.width / stretch, bounds.height * stretch)
+    spacing = min(side / NODES_PER_SIDE, max(finest, longer / MOST_NODES_PER_SIDE))
+    return Spacing(spacing * stretch, spacing / stretch)
 
 
 @dataclass(frozen=True)
