@@ -3,15 +3,15 @@
 There the slope of a distance leaps at the sides of cells, and no smooth u comes near it. So u is
 linear over triangles of a lattice whose nodes lie on these sides. It begins as half the distance
 from the start minus half that to the goal. From there u(goal) - u(start) is made as large as it
-can be where the dual norm of du is at most 1: by the algorithm of Chambolle and Pock (2011), whose
-steps are preconditioned by cosine transforms. Where the norm stays above 1, in few cells, costs are
-lowered.
+can be where the dual norm of du is at most 1: by the algorithm of Chambolle and Pock (2011). Its
+steps are preconditioned, each cell by its own cost. Where the norm stays above 1, in few cells,
+costs are lowered. A finer lattice begins with the u of the one before.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -25,17 +25,18 @@ from ..surface.metric import inverse_metric_tensor
 from ..validation import Array, Point
 from .certificate import Certificate, certify
 from .claims import Claim, Core, cell_needs
+from .multigrid import Multigrid
 from .sides import not_even_touched
 
-# The numbers of lattice cells on a side of a cell of constant cost; even, so that the centres of
-# cells, where the pieces of the ground meet, are on its lines, too.
-PER_CELL = (2, 4, 8)
+# The first lattice has two of its cells on a side of a cell of constant cost, where that makes no
+# more nodes than this; else one, or less. Finer ones follow up to the second number of nodes.
+FEW_NODES, MOST_NODES = 300_000, 5_000_000
+# So often the cells are cut in two along both axes, at most.
+FINEST = 3
 
-# Lattices have no more nodes than this, and finer ones than the first no more than the second.
-MOST_NODES, MOST_FINER_NODES = 300_000, 150_000
-
-# Steps of the two sizes' ratio, each with so many iterations. Then cells are tightened so often.
-RATIOS, ITERATIONS = (0.3, 1.0, 3.0, 3.0), 40
+# Steps of the two sizes' ratio, each with so many iterations, on the first lattice and on finer
+# ones. Then cells are tightened so often.
+RATIOS, FINER_RATIOS, ITERATIONS = (0.3, 1.0, 3.0, 3.0), (1.0, 3.0), 40
 TIGHTENINGS = 12
 
 # The search ends where so many of these in a row have raised the bound by less than this share.
@@ -59,36 +60,24 @@ FLAT_ENOUGH = 0.999
 # Fields are continued into obstacles by so many nodes.
 AROUND = 3
 
-Stepper = Callable[[float], None]
 
+def first_lattice(problem: Problem, window: Bounds) -> tuple[Lattice, int]:
+    """A lattice over a window, with nodes on the sides of cells of constant cost.
 
-def cell_lattices(problem: Problem, window: Bounds) -> Iterator[Lattice]:
-    """Ever finer lattices over a window, with nodes on the sides of cells of constant cost."""
-    data = problem.surface.data
-    assert isinstance(data, Spline)
-    cells = data.cells
-    size = window.width / cells.dx * window.height / cells.dy
-    # Where there are very many cells, several make one of the lattice.
-    merged = max(math.ceil(math.sqrt(size / MOST_NODES)), 1)
-    if merged > 1:
-        yield _aligned(problem, window, merged, 1)
-        return
-    first = PER_CELL[0] if size * PER_CELL[0] ** 2 <= MOST_NODES else 1
-    yield _aligned(problem, window, 1, first)
-    for per_cell in PER_CELL:
-        if first < per_cell and size * per_cell**2 <= MOST_FINER_NODES:
-            yield _aligned(problem, window, 1, per_cell)
-
-
-def _aligned(problem: Problem, window: Bounds, merged: int, per_cell: int) -> Lattice:
-    """The lattice of the cells that meet a window: ``merged`` in one, or cut in ``per_cell``."""
+    Also how often these cells are cut in two along both axes; below 0 where, instead, so often
+    twice as many make one.
+    """
     data = problem.surface.data
     assert isinstance(data, Spline)
     cells, axes = data.cells, []
+    size = window.width / cells.dx * window.height / cells.dy
+    level = 1
+    while 4.0**level * size > (FEW_NODES if level == 1 else MOST_NODES):
+        level -= 1
     west, south, east, north = problem.bounds
     for low, high, ends, origin, step in (
-        (window.x1_min, window.x1_max, (west, east), cells.x0, merged * cells.dx / per_cell),
-        (window.x2_min, window.x2_max, (south, north), cells.y0, merged * cells.dy / per_cell),
+        (window.x1_min, window.x1_max, (west, east), cells.x0, 0.5**level * cells.dx),
+        (window.x2_min, window.x2_max, (south, north), cells.y0, 0.5**level * cells.dy),
     ):
         first = math.floor((low - origin) / step + NEAR)
         last = max(math.ceil((high - origin) / step - NEAR), first + 1)
@@ -97,7 +86,7 @@ def _aligned(problem: Problem, window: Bounds, merged: int, per_cell: int) -> La
         last += abs(origin + last * step - ends[1]) <= NEAR * step
         axes.append((origin + first * step, origin + last * step, last - first + 1))
     (x0, x1, nx), (y0, y1, ny) = axes
-    return Lattice(Bounds(x0, y0, x1, y1), nx, ny)
+    return Lattice(Bounds(x0, y0, x1, y1), nx, ny), level
 
 
 class FlowSearch:
@@ -115,18 +104,30 @@ class FlowSearch:
         length: float,
         target_gap: float,
         must_stop: MustStop,
+        coarser: FlowSearch | None = None,
     ) -> None:
         self.problem, self.lattice, self.must_stop = problem, lattice, must_stop
         self.enough = length / (1.0 + target_gap)
-        self.u = self._between_fields(length)
         self.costs, self.roots = self._limits()  # what norms are measured by
         self.tightened = self.costs.copy()  # what the flow is led by
+        self.weights = 1.0 / np.minimum(self.costs, self.costs[self.costs < FREE].max())
         self.norms = np.empty_like(self.costs)
         self.rising = np.zeros(self.costs.shape, bool)
-        self.flow, self.sources = np.zeros((*self.costs.shape, 2, 2)), np.empty_like(self.u)
-        self.ends = _weights(problem.goal, lattice) - _weights(problem.start, lattice)
+        self.flow = np.zeros((*self.costs.shape, 2, 2))
+        self.ratios = RATIOS if coarser is None else FINER_RATIOS
+        if coarser is None:
+            self.u = self._between_fields(length)
+        else:
+            self.u = np.empty((lattice.ny, lattice.nx))
+            kernels.refine(coarser.u, coarser.flow, coarser.rising, self.u, self.flow)
         self.best, self.best_u = -math.inf, self.u
         self._note()
+
+    def finer(self, length: float, target_gap: float) -> FlowSearch:
+        """The search that goes on from here, with the cells of the lattice cut in four."""
+        nx, ny = 2 * self.lattice.nx - 1, 2 * self.lattice.ny - 1
+        lattice = Lattice(self.lattice.bounds, nx, ny)
+        return FlowSearch(self.problem, lattice, length, target_gap, self.must_stop, self)
 
     def _between_fields(self, length: float) -> Array:
         """Half the distance from the start minus half that to the goal, at the nodes."""
@@ -167,12 +168,32 @@ class FlowSearch:
 
     def _note(self) -> None:
         """Measure u, and keep it where it proves the most so far."""
-        lattice = self.lattice
-        kernels.choose_diagonals(self.u, (lattice.dy / lattice.dx) ** 2, self.rising)
+        kernels.choose_diagonals(self.u, self._ratio, self.rising)
         kernels.fill_norms(self.u, self.roots, self.costs, self.rising, self.norms)
+        self.ends = self._weights(self.problem.goal) - self._weights(self.problem.start)
         value = float((self.ends * self.u).sum()) / max(float(self.norms.max()), 1e-300)
         if value > self.best:
             self.best, self.best_u = value, self.u.copy()
+
+    @property
+    def _ratio(self) -> float:
+        """Of a cell's height to its width, squared."""
+        return (self.lattice.dy / self.lattice.dx) ** 2
+
+    def _weights(self, point: Point) -> Array:
+        """The weights (ny, nx) of the nodes at a point: of the corners of its triangle."""
+        lattice = self.lattice
+        weights = np.zeros((lattice.ny, lattice.nx))
+        s, t = _place(point, lattice)
+        i, j = min(int(s), lattice.nx - 2), min(int(t), lattice.ny - 2)
+        s, t = s - i, t - j
+        if self.rising[j, i]:
+            low, high = min(s, t), max(s, t)
+            weights[j : j + 2, i : i + 2] = [[1.0 - high, s - low], [t - low, low]]
+        else:
+            low, high = max(1.0 - s - t, 0.0), max(s + t - 1.0, 0.0)
+            weights[j : j + 2, i : i + 2] = [[low, s - high], [t - high, high]]
+        return weights
 
     @property
     def is_done(self) -> bool:
@@ -181,22 +202,36 @@ class FlowSearch:
 
     def run(self) -> None:
         """Raise the bound until it is near enough."""
-        step = self._stepper()
-        for ratio in RATIOS:
-            step(ratio)
-            self._note()
+        sides = self.lattice.dx * self.lattice.dy / np.square(self.lattice.spacing)
+        inverse = Multigrid(self.weights, *sides)
+        for ratio in self.ratios:
+            self._step(ratio, inverse)
             if self.is_done:
                 return
         self._correct()
         known, idle = self.best, 0
         for _ in range(TIGHTENINGS):
-            if self.is_done or idle == PATIENCE:
-                return
             self.tightened /= np.maximum(self.norms / TOLERATED, 1.0)
-            step(RATIOS[-1])
-            self._note()
+            self._step(self.ratios[-1], inverse)
+            if self.is_done:
+                return
             idle = 0 if self.best > known * (1.0 + GAIN) else idle + 1
             known = max(known, self.best)
+            if idle == PATIENCE:
+                return
+
+    def _step(self, ratio: float, inverse: Multigrid) -> None:
+        """Iterations of the algorithm, with a ratio of its two steps."""
+        ahead, sigma = self.u, 0.99 * math.sqrt(ratio) * self.weights
+        sources = np.empty_like(self.u)
+        for _ in range(ITERATIONS):
+            if self.must_stop():
+                break
+            kernels.step_flow(ahead, self.roots, self.tightened, self.rising, sigma, self.flow)
+            kernels.fill_sources(self.flow, self.roots, self.rising, sources)
+            change = inverse.solve(self.ends - sources) / math.sqrt(ratio)
+            ahead, self.u = self.u + 2.0 * change, self.u + change
+        self._note()
 
     def _correct(self) -> None:
         """On hills a cell's norm is larger than in its centre: measure by what the checker says."""
@@ -206,41 +241,6 @@ class FlowSearch:
         self.costs /= hidden
         self.tightened /= hidden
 
-    def _stepper(self) -> Stepper:
-        """Iterations of the algorithm, with a ratio of its two steps."""
-        from scipy.fft import dctn, idctn
-
-        ny, nx = self.u.shape
-        sides = np.square(
-            np.sqrt(self.lattice.dx * self.lattice.dy) / np.array(self.lattice.spacing)
-        )
-        along_x, along_y = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n) for n in (nx, ny))
-        # The squares of the slopes of both triangles, in terms of cosines.
-        squares = 2.0 * (sides[0] * along_x + sides[1] * along_y[:, None])
-        squares[0, 0] = math.inf  # a constant changes nothing
-        typical = max(self.best, 1e-300) / max(math.hypot(*self._steps_apart()), 1.0)
-
-        def step(ratio: float) -> None:
-            # Costs in cells of the lattice, along the path, are 1 then.
-            sigma, tau = math.sqrt(ratio) / typical, typical / math.sqrt(ratio)
-            ahead = self.u
-            for _ in range(ITERATIONS):
-                if self.must_stop():
-                    return
-                kernels.step_flow(
-                    ahead, self.roots, self.tightened, self.rising, 0.99 * sigma, self.flow
-                )
-                kernels.fill_sources(self.flow, self.roots, self.rising, self.sources)
-                change = idctn(dctn(self.ends - self.sources, norm="ortho") / squares, norm="ortho")
-                ahead = self.u + 2.0 * tau * change
-                self.u = self.u + tau * change
-
-        return step
-
-    def _steps_apart(self) -> Array:
-        """How far the goal is from the start, in cells of the lattice."""
-        return np.subtract(self.problem.goal, self.problem.start) / self.lattice.spacing
-
     def _claim(self, u: Array) -> Claim:
         """A claim that is not proven yet."""
         problem, lattice = self.problem, self.lattice
@@ -249,14 +249,15 @@ class FlowSearch:
             norm=math.inf,
             coefficients=np.pad(u, 1, mode="edge"),
             bounds=lattice.bounds,
-            horizon=float((_weights(problem.goal, lattice) * u).sum()),
+            horizon=float((self._weights(problem.goal) * u).sum()),
             start_core=_core(problem.start, lattice),
             goal_core=_core(problem.goal, lattice),
         )
 
     def certify(self) -> Certificate:
         """The certificate that the best u makes."""
-        begin = float((_weights(self.problem.start, self.lattice) * self.best_u).sum())
+        kernels.choose_diagonals(self.best_u, self._ratio, self.rising)
+        begin = float((self._weights(self.problem.start) * self.best_u).sum())
         claim = self._claim(self.best_u - begin)
         needs = cell_needs(self.problem, claim, FLAT_ENOUGH, self.must_stop)
         return certify(self.problem, claim, needs, self.must_stop)
@@ -299,16 +300,6 @@ def _place(point: Point, lattice: Lattice) -> Array:
     return np.subtract(point, lattice.bounds[:2]) / lattice.spacing
 
 
-def _weights(point: Point, lattice: Lattice) -> Array:
-    """The weights (ny, nx) of the nodes at a point, in bilinear interpolation."""
-    weights = np.zeros((lattice.ny, lattice.nx))
-    s, t = _place(point, lattice)
-    i, j = min(int(s), lattice.nx - 2), min(int(t), lattice.ny - 2)
-    s, t = s - i, t - j
-    weights[j : j + 2, i : i + 2] = np.outer([1.0 - t, t], [1.0 - s, s])
-    return weights
-
-
 def _core(point: Point, lattice: Lattice) -> Core:
     """The cells that hold or touch a point."""
     (low_x, low_y), (high_x, high_y) = (
@@ -334,9 +325,13 @@ def cell_certificates(
     problem: Problem, window: Bounds, length: float, target_gap: float, must_stop: MustStop
 ) -> Iterator[Certificate]:
     """Certificates from ever finer lattices, where costs are constant in cells."""
-    for lattice in cell_lattices(problem, window):
-        search = FlowSearch(problem, lattice, length, target_gap or GOOD_GAP, must_stop)
+    lattice, level = first_lattice(problem, window)
+    gap = target_gap or GOOD_GAP
+    search = FlowSearch(problem, lattice, length, gap, must_stop)
+    while True:
         search.run()
         yield search.certify()
-        if must_stop():
+        level += 1
+        if must_stop() or level > FINEST or 4 * search.u.size > MOST_NODES:
             return
+        search = search.finer(length, gap)

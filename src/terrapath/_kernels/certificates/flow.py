@@ -57,16 +57,17 @@ def fill_norms(u, roots, costs, rising, norms):
 
 @kernel
 def step_flow(u, roots, costs, rising, sigma, flow):
-    """A step of the flow (ny, nx, 2, 2) through both triangles of each cell."""
+    """A step of the flow (ny, nx, 2, 2) through both triangles of each cell; sigma is (ny, nx)."""
     for j in range(costs.shape[0]):
         for i in range(costs.shape[1]):
             for upper in range(2):
                 right = 1 - upper if rising[j, i] else upper
                 x, y = slope_of(u, i, j, right, upper)
                 x, y = turned(roots, i, j, x, y)
-                x, y = flow[j, i, upper, 0] + sigma * x, flow[j, i, upper, 1] + sigma * y
+                step = sigma[j, i]
+                x, y = flow[j, i, upper, 0] + step * x, flow[j, i, upper, 1] + step * y
                 size = math.sqrt(x * x + y * y)
-                share = max(1.0 - sigma * costs[j, i] / size, 0.0) if size > 0.0 else 0.0
+                share = max(1.0 - step * costs[j, i] / size, 0.0) if size > 0.0 else 0.0
                 flow[j, i, upper, 0], flow[j, i, upper, 1] = share * x, share * y
 
 
@@ -83,6 +84,30 @@ def fill_sources(flow, roots, rising, sources):
                 sources[j + upper, i] -= x
                 sources[j + 1, i + right] += y
                 sources[j, i + right] -= y
+
+
+@kernel
+def refine(u, flow, rising, finer_u, finer_flow):
+    """The same u and flow on the lattice whose cells are these cut in four."""
+    for j in range(rising.shape[0]):
+        for i in range(rising.shape[1]):
+            for q in range(2):
+                for p in range(2):
+                    # Of the four, two are on the diagonal, and two within one triangle.
+                    on_diagonal = (q == p) == rising[j, i]
+                    for upper in range(2):
+                        k = upper if on_diagonal else q
+                        x, y = 0.5 * flow[j, i, k, 0], 0.5 * flow[j, i, k, 1]
+                        finer_flow[2 * j + q, 2 * i + p, upper, 0] = x
+                        finer_flow[2 * j + q, 2 * i + p, upper, 1] = y
+    for j in range(finer_u.shape[0]):
+        for i in range(finer_u.shape[1]):
+            a, b = j // 2, i // 2
+            down, east = j % 2, i % 2
+            if down and east and not rising[a, b]:
+                finer_u[j, i] = 0.5 * (u[a, b + 1] + u[a + 1, b])
+            else:
+                finer_u[j, i] = 0.5 * (u[a, b] + u[a + down, b + east])
 
 
 @kernel
