@@ -71,10 +71,6 @@ def test_a_river_is_crossed_at_its_ford():
         assert walker.length(solution.path.points) == pytest.approx(expected, rel=1e-6)
 
 
-# The search for a bound ends too early on this map.
-WEAK_BOUND = pytest.mark.xfail(reason="a gap of 15 % instead of 2 %", strict=True)
-
-
 def rivals(problem):
     for neighbours, spacing in ((32, None), (16, CELL / 3.0)):
         yield tp.plan(problem, "a-star", neighbours=neighbours, spacing=spacing, refine=True)
@@ -100,7 +96,7 @@ def problem_ends(problem):
     ("seed", "steep"),
     [(1, 0.0), (2, 0.5)]
     + [pytest.param(s, 0.4 * (s % 3), marks=pytest.mark.slow) for s in range(3, 7)]
-    + [pytest.param(15, 0.0, marks=[pytest.mark.slow, WEAK_BOUND])],
+    + [pytest.param(15, 0.0, marks=pytest.mark.slow)],
 )
 def test_optimal_is_the_best_that_is_known(seed, steep):
     problem, walker = random_problem(seed, steep)

@@ -21,7 +21,7 @@ from .._support.watching import MustStop
 from ..problem import Problem
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
-from ..surface.metric import inverse_metric_tensor
+from ..surface.metric import inverse_metric_tensor, is_flat
 from ..validation import Array, Point
 from .certificate import Certificate, certify
 from .claims import Claim, Core, cell_needs
@@ -108,6 +108,7 @@ class FlowSearch:
     ) -> None:
         self.problem, self.lattice, self.must_stop = problem, lattice, must_stop
         self.enough = length / (1.0 + target_gap)
+        self.is_flat = is_flat(problem.surface, problem.bounds)
         self.costs, self.roots = self._limits()  # what norms are measured by
         self.tightened = self.costs.copy()  # what the flow is led by
         self.weights = 1.0 / np.minimum(self.costs, self.costs[self.costs < FREE].max())
@@ -169,11 +170,18 @@ class FlowSearch:
     def _note(self) -> None:
         """Measure u, and keep it where it proves the most so far."""
         kernels.choose_diagonals(self.u, self._ratio, self.rising)
-        kernels.fill_norms(self.u, self.roots, self.costs, self.rising, self.norms)
+        self._measure()
         self.ends = self._weights(self.problem.goal) - self._weights(self.problem.start)
         value = float((self.ends * self.u).sum()) / max(float(self.norms.max()), 1e-300)
         if value > self.best:
             self.best, self.best_u = value, self.u.copy()
+
+    def _measure(self) -> None:
+        """The norms of all cells; on hills, where they vary in a cell, the checker's."""
+        if self.is_flat:
+            kernels.fill_norms(self.u, self.roots, self.costs, self.rising, self.norms)
+        else:
+            self.norms = cell_needs(self.problem, self._claim(self.u), 0.0).slope
 
     @property
     def _ratio(self) -> float:
@@ -208,7 +216,6 @@ class FlowSearch:
             self._step(ratio, inverse)
             if self.is_done:
                 return
-        self._correct()
         known, idle = self.best, 0
         for _ in range(TIGHTENINGS):
             self.tightened /= np.maximum(self.norms / TOLERATED, 1.0)
@@ -232,14 +239,6 @@ class FlowSearch:
             change = inverse.solve(self.ends - sources) / math.sqrt(ratio)
             ahead, self.u = self.u + 2.0 * change, self.u + change
         self._note()
-
-    def _correct(self) -> None:
-        """On hills a cell's norm is larger than in its centre: measure by what the checker says."""
-        found = cell_needs(self.problem, self._claim(self.u), 0.0).slope
-        hidden = np.maximum(found / np.maximum(self.norms, 1e-300), 1.0)
-        hidden[self.norms < 0.5 * self.norms.max()] = 1.0
-        self.costs /= hidden
-        self.tightened /= hidden
 
     def _claim(self, u: Array) -> Claim:
         """A claim that is not proven yet."""

@@ -19,7 +19,7 @@ from .._kernels.geodesics.visibility import UNSEEN, Search
 from .._kernels.surface.surfaces import Spline
 from .._support.watching import MustStop, never
 from ..problem import Path, Problem
-from ..surface import Surface
+from ..surface import metric
 from ..surface.metric import curve_length, segment_lengths
 from ..validation import Array
 from .snell import ON_SIDE, obeying_snell
@@ -58,7 +58,7 @@ class CellGrid(NamedTuple):
     y: Array
     costs: Array  # (ny, nx)
     sides: Array  # (2,): their typical lengths
-    is_flat: bool  # no relief, and no smooth cost
+    is_flat: bool  # planes as layers, and no smooth cost
 
 
 def grid_of(problem: Problem) -> CellGrid | None:
@@ -66,7 +66,8 @@ def grid_of(problem: Problem) -> CellGrid | None:
     surface, bounds = problem.surface, problem.bounds
     if surface.cost_cells is None or not isinstance(surface.data, Spline):
         return None
-    cells, is_flat = surface.data.cells, _is_flat(surface)
+    cells = surface.data.cells
+    is_flat = surface.cost_data is None and metric.is_flat(surface, bounds)
     rows, columns = cells.costs.shape
     # On flat ground cells stay whole.
     longest = math.inf if is_flat else FEATURES_PER_PART * surface.resolution
@@ -81,15 +82,6 @@ def grid_of(problem: Problem) -> CellGrid | None:
     )
     sides = np.array([np.median(np.diff(x)), np.median(np.diff(y))])
     return CellGrid(x, y, cells.costs[np.ix_(j, i)], sides, is_flat)
-
-
-def _is_flat(surface: Surface) -> bool:
-    """Has it no relief, and no smooth cost?"""
-    data = surface.data
-    if not isinstance(data, Spline) or surface.cost_data is not None:
-        return False
-    reliefs = [float(np.ptp(layer)) for layer in data.coefficients]
-    return not (np.array(reliefs) * data.weights).any()
 
 
 def _sides(
@@ -137,7 +129,7 @@ def _sides_with(problem: Problem, grid: CellGrid, points: Array) -> kernels.Side
     held = np.nonzero(known)[0][np.argsort(labels, kind="stable")]
     first = np.concatenate([[0], np.cumsum(np.bincount(labels, minlength=len(cells)))])
     surface = problem.surface
-    heights = np.zeros((len(points), 0 if grid.is_flat else len(surface.layers)))
+    heights = np.empty((len(points), len(surface.layers)))
     kernels.fill_heights(surface.data, points, heights)
     return kernels.Sides(
         costs=grid.costs.ravel()[cells],

@@ -16,7 +16,7 @@ import shapely
 from .._kernels.geodesics import sight, visibility as kernels
 from .._kernels.space.free_space import list_edges
 from .._kernels.surface.cells import range_in_box
-from .._kernels.surface.surfaces import Peaks, Spline
+from .._kernels.surface.surfaces import Spline
 from .._support.watching import WatchCount
 from ..errors import InputError
 from ..problem import Path, Problem
@@ -33,12 +33,7 @@ from ..space.free_space import (
 from ..space.reachability import merged_masks, runs
 from ..surface import Mask, metric
 from ..surface.bounds import Bounds
-from ..surface.layers import cells_within
 from ..validation import Array
-
-# A surface is flat where its weighted slopes, and the logarithm of its cost, change by no more than
-# this. Lengths change by no more than that, relative.
-FLATNESS = 1e-7
 
 # The distance between a path and the corners that it bends round: a share of the region's side, but
 # not below the rounding of the largest coordinate.
@@ -86,29 +81,11 @@ class Taut(NamedTuple):
 def is_flat(problem: Problem) -> bool:
     """Is the metric h the same in all of the bounds: planes as layers, and constant costs?"""
     data, bounds = problem.surface.data, problem.bounds
-    return _peaks_are_flat(data) if isinstance(data, Peaks) else _spline_is_flat(data, bounds)
-
-
-def _peaks_are_flat(data: Peaks) -> bool:
-    weights = np.repeat(data.weights, np.diff(data.first))
-    slopes = weights * np.abs(data.peaks[:, 0]) * np.sqrt(2.0 * data.peaks[:, 1] / math.e)
-    return float(slopes.sum()) <= FLATNESS
-
-
-def _spline_is_flat(data: Spline, bounds: Bounds) -> bool:
-    """In a cell a slope lies between the differences of the coefficients around."""
-    rows = cells_within(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.coefficients.shape[1])
-    columns = cells_within(
-        bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.coefficients.shape[2]
-    )
-    layers, logs = data.coefficients[:, rows, columns], data.log_cost[:, rows, columns]
-    along_x = np.ptp(np.diff(layers, axis=2), axis=(1, 2)) / data.dx
-    along_y = np.ptp(np.diff(layers, axis=1), axis=(1, 2)) / data.dy
-    change = math.hypot(*(data.weights * along_x), *(data.weights * along_y))
-    costs = range_in_box(data.cells, bounds.x1_min, bounds.x1_max, bounds.x2_min, bounds.x2_max)
-    if costs.low < costs.high:
-        return False
-    return change <= FLATNESS and (logs.size == 0 or float(np.ptp(logs)) <= FLATNESS)
+    if isinstance(data, Spline):
+        costs = range_in_box(data.cells, bounds.x1_min, bounds.x1_max, bounds.x2_min, bounds.x2_max)
+        if costs.low < costs.high:
+            return False
+    return metric.is_flat(problem.surface, bounds)
 
 
 def shortest_taut_path(problem: Problem, *, watch: WatchCount | None = None) -> Taut:

@@ -10,10 +10,12 @@ import numpy.typing as npt
 
 from .._kernels.surface import lengths
 from .._kernels.surface.points import fill_metric
+from .._kernels.surface.surfaces import Peaks, Spline
 from ..errors import InputError
 from ..validation import Array, as_points
 from . import Surface
 from .bounds import Bounds
+from .layers import cells_within
 
 # Relative tolerance of a true length; the promised accuracy is 1e-9.
 QUADRATURE_TOLERANCE = 1e-12
@@ -30,6 +32,10 @@ FEATURES_PER_PROBE, ROUGH, PROBES = 4.0, 3e-4, 256
 # rules agree to this share: that is right to 1e-3 where one rule for each piece errs by a tenth.
 # The number is a little above a half, so that rounding does not decide how many pieces a step has.
 ROUGH_FEATURES, ROUGH_TOLERANCE = 0.5 + 1e-9, 1e-4
+
+# A surface is flat where its weighted slopes, and the logarithm of its cost, change by no more than
+# this. Lengths change by no more than that, relative.
+FLATNESS = 1e-7
 
 
 def metric_tensor(surface: Surface, points: npt.ArrayLike) -> Array:
@@ -152,6 +158,31 @@ def is_rough(surface: Surface, bounds: Bounds) -> bool:
     shortest = ROUGH_FEATURES * surface.resolution
     lengths.fill_segment_lengths(surface.data, a, b, shortest, ROUGH_TOLERANCE, adaptive)
     return bool(np.abs(once - adaptive).sum() > ROUGH * adaptive.sum())
+
+
+def is_flat(surface: Surface, bounds: Bounds) -> bool:
+    """Is h the same in all of the bounds, but for costs that are constant in cells?"""
+    data = surface.data
+    return _peaks_are_flat(data) if isinstance(data, Peaks) else _spline_is_flat(data, bounds)
+
+
+def _peaks_are_flat(data: Peaks) -> bool:
+    weights = np.repeat(data.weights, np.diff(data.first))
+    slopes = weights * np.abs(data.peaks[:, 0]) * np.sqrt(2.0 * data.peaks[:, 1] / math.e)
+    return float(slopes.sum()) <= FLATNESS
+
+
+def _spline_is_flat(data: Spline, bounds: Bounds) -> bool:
+    """In a cell a slope lies between the differences of the coefficients around."""
+    rows = cells_within(bounds.x2_min, bounds.x2_max, data.y0, data.dy, data.coefficients.shape[1])
+    columns = cells_within(
+        bounds.x1_min, bounds.x1_max, data.x0, data.dx, data.coefficients.shape[2]
+    )
+    layers, logs = data.coefficients[:, rows, columns], data.log_cost[:, rows, columns]
+    along_x = np.ptp(np.diff(layers, axis=2), axis=(1, 2)) / data.dx
+    along_y = np.ptp(np.diff(layers, axis=1), axis=(1, 2)) / data.dy
+    change = math.hypot(*(data.weights * along_x), *(data.weights * along_y))
+    return change <= FLATNESS and (logs.size == 0 or float(np.ptp(logs)) <= FLATNESS)
 
 
 def feature_size(surface: Surface) -> tuple[float, float]:

@@ -2,8 +2,9 @@
 
 A level has nodes (ny, nx) with links to their eight neighbours. Its operator is, at a node, the sum
 of link times difference over these. Every second node along both axes belongs to the next coarser
-level. The others are interpolated from these as their links say (Dendy 1982), so that a wall of weak
-links stays a wall. The links of the coarser level are those of the interpolated function's energy.
+level. The others are interpolated from these as their links say (Dendy 1982), so that a wall of
+weak links stays a wall. The links of the coarser level are those of the interpolated function's
+energy.
 
 All arrays have a margin of one node, whose links are 0.
 """

@@ -27,7 +27,7 @@ class Sides(NamedTuple):
     first: np.ndarray  # (cells + 1,) int64: where the points of each cell begin in ``held``
     held: np.ndarray  # int64: the points on the sides of each cell
     floor: float  # no cost is below it
-    is_flat: bool  # no layers, and no smooth cost
+    is_flat: bool  # planes as layers, and no smooth cost
     has_obstacles: bool
 
 
