@@ -36,7 +36,7 @@ FINEST = 3
 
 # Steps of the two sizes' ratio, each with so many iterations, on the first lattice and on finer
 # ones. Then cells are tightened so often.
-RATIOS, FINER_RATIOS, ITERATIONS = (0.3, 1.0, 3.0, 3.0), (1.0, 3.0), 40
+RATIOS, FINER_RATIOS, ITERATIONS = (1.0, 3.0, 10.0, 30.0), (30.0,), 40
 TIGHTENINGS = 12
 
 # The search ends where so many of these in a row have raised the bound by less than this share.
