@@ -29,8 +29,8 @@ from .multigrid import Multigrid
 from .sides import not_even_touched
 
 # The first lattice has two of its cells on a side of a cell of constant cost, where that makes no
-# more nodes than this; else one, or less. Finer ones follow up to the second number of nodes.
-FEW_NODES, MOST_NODES = 300_000, 5_000_000
+# more nodes than this; else one, or less, for the second number. Finer ones have up to the third.
+FEW_NODES, MOST_NODES, MOST_FINER_NODES = 300_000, 5_000_000, 1_500_000
 # So often the cells are cut in two along both axes, at most.
 FINEST = 3
 
@@ -116,12 +116,8 @@ class FlowSearch:
         self.rising = np.zeros(self.costs.shape, bool)
         self.flow = np.zeros((*self.costs.shape, 2, 2))
         self.ratios = RATIOS if coarser is None else FINER_RATIOS
-        if coarser is None:
-            self.u = self._between_fields(length)
-        else:
-            self.u = np.empty((lattice.ny, lattice.nx))
-            kernels.refine(coarser.u, coarser.flow, coarser.rising, self.u, self.flow)
-        self.best, self.best_u = -math.inf, self.u
+        self.best = -math.inf
+        self.u = self._between_fields(length) if coarser is None else self._refined(coarser)
         self._note()
 
     def finer(self, length: float, target_gap: float) -> FlowSearch:
@@ -129,6 +125,17 @@ class FlowSearch:
         nx, ny = 2 * self.lattice.nx - 1, 2 * self.lattice.ny - 1
         lattice = Lattice(self.lattice.bounds, nx, ny)
         return FlowSearch(self.problem, lattice, length, target_gap, self.must_stop, self)
+
+    def _refined(self, coarser: FlowSearch) -> Array:
+        """The same u and flow as on a coarser lattice; its best u is kept, too."""
+        u = np.empty((2, self.lattice.ny, self.lattice.nx))
+        kernels.choose_diagonals(coarser.best_u, coarser._ratio, coarser.rising)
+        kernels.refine(coarser.best_u, coarser.flow, coarser.rising, u[0], self.flow)
+        self.u = u[0]
+        self._note()
+        kernels.choose_diagonals(coarser.u, coarser._ratio, coarser.rising)
+        kernels.refine(coarser.u, coarser.flow, coarser.rising, u[1], self.flow)
+        return u[1]
 
     def _between_fields(self, length: float) -> Array:
         """Half the distance from the start minus half that to the goal, at the nodes."""
@@ -331,6 +338,6 @@ def cell_certificates(
         search.run()
         yield search.certify()
         level += 1
-        if must_stop() or level > FINEST or 4 * search.u.size > MOST_NODES:
+        if must_stop() or level > FINEST or 4 * search.u.size > MOST_FINER_NODES:
             return
         search = search.finer(length, gap)
