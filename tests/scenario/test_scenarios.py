@@ -535,13 +535,13 @@ def test_every_key_stands_in_a_written_scenario_and_can_be_switched_on(folder, c
     text = Path("one-peak.toml").read_text()
     in_files = [entry for entry in options() if entry.key != "allow_external"]
     for entry in in_files:
-        shown = entry.key if entry.default != {} else f"[map.{entry.key}"
+        shown = entry.key if entry.default != {} else f"[{entry.section}.{entry.key}"
         assert f"\n{shown}" in text or f"\n# {shown}" in text, entry.key
         for line in entry.option.help.split(". ")[0].split()[:3]:
             assert line in text
     switched = [
         line.removeprefix("# ")
-        if line.startswith("# ") and (" = " in line or "# [map." in line)
+        if line.startswith("# ") and (" = " in line or line.startswith(("# [map.", "# [travel.")))
         else line
         for line in text.split("\n")
     ]

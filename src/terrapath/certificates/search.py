@@ -19,6 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from .._support.watching import MustStop, never, stop_after
 from ..distance.eikonal import Eikonal, model_source, near_distance, window_radius
+from ..errors import InputError
 from ..problem import Problem
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
@@ -249,6 +250,10 @@ def lower_bound(
     Raises InputError for numbers that are not above 0.
     """
     _check(length, target_gap, time_limit)
+    if problem.travel is not None:
+        raise InputError(
+            "no certificates are made with a travel model yet; problem.chord is a lower bound"
+        )
     must_stop = never if time_limit is None else stop_after(time_limit)
     # Overflow makes NaN, which proves nothing; so it needs no warning.
     with np.errstate(all="ignore"):

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
-from ..scenario.option import Declared, Extent, Files, Point, Points, Rectangle
+from ..scenario.option import Declared, Extent, Files, ModelOptions, Point, Points, Rectangle
 from ..scenario.scenario import (
     Given,
     LayerTable,
@@ -90,6 +90,21 @@ def _parse_weights(texts: list[str], option: str, form: str) -> Weights:
     return weights
 
 
+def as_number(text: str) -> float | str:
+    """A number where the text is one, whole where it is whole."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _parse_options(texts: list[str], option: str, form: str) -> ModelOptions:
+    pairs = _parse_pairs(texts, option, form)
+    return {name: as_number(value) for name, value in pairs.items()}
+
+
 def _parse_extent(text: str, option: str) -> Extent:
     words: dict[str, Extent] = {"auto": "auto", "none": "none"}
     if text in words:
@@ -106,7 +121,7 @@ def _is_flag(declaration: Declared) -> bool:
 
 def _typed_by(declaration: Declared) -> object:
     """The type that typer reads from the command line; what it cannot read stays text."""
-    several = (Points, Point | Points, Files, LayerTables, Weights)
+    several = (Points, Point | Points, Files, LayerTables, Weights, ModelOptions)
     if declaration.type in several:
         return list[str] | None
     for kind in (int, float, bool):
@@ -126,6 +141,7 @@ def _value(declaration: Declared, given: object) -> object:
         (Rectangle | None, lambda text: _numbers(text, name, form, "a rectangle")),
         (LayerTables, lambda texts: _parse_layers(texts, flag, form)),
         (Weights, lambda texts: _parse_weights(texts, flag, form)),
+        (ModelOptions, lambda texts: _parse_options(texts, flag, form)),
         (Extent, lambda text: _parse_extent(text, flag)),
         (int | str | None, lambda text: int(text) if text.isdecimal() else text),
         (Files, tuple),

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..scenario.answers import Answer
 
 
-@with_options("map", "route", "constraints", "planner", "output")
+@with_options("map", "route", "constraints", "travel", "planner", "output")
 def plan_command(where: Where, given: Given) -> int:
     """Plan one route on a surface, and prove how far from the shortest it can be.
 

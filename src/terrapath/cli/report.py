@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from ..distance.field import DistanceField
     from ..planners import GoalAnswer
 
+# Units that are of no length.
+AMOUNTS = ("s", "J", "J/kg")
+
 # At most this many of a planner's alternative routes are shown.
 MOST_ALTERNATIVES = 5
 
@@ -33,7 +36,7 @@ def _gap(solution: Solution, target: float | None) -> str:
     if target is not None:
         met = "is met" if gap <= target else "is not met"
         return f"{text}; the target of {percent(target)} {met}"
-    if gap > LARGE_GAP and solution.planner != "optimal":
+    if gap > LARGE_GAP and solution.planner != "optimal" and solution.problem.travel is None:
         return f"{text}; --planner optimal may find a better route, or a better bound"
     return text
 
@@ -46,7 +49,8 @@ def _grade(slope: float) -> str:
 def _longer(length: float, than: float, unit: str) -> str:
     """A length, and how much longer it is than the path."""
     more = length / than - 1.0 if than > 0.0 else 0.0
-    return f"{amount(length, unit)} ({percent(more) + ' longer' if more > 1e-9 else 'as long'})"
+    longer, same = (" more", "the same") if unit in AMOUNTS else (" longer", "as long")
+    return f"{amount(length, unit)} ({percent(more) + longer if more > 1e-9 else same})"
 
 
 def _point(problem: Problem, point: tuple[float, float]) -> str:
@@ -65,24 +69,45 @@ def _counter_line(solution: Solution) -> str:
 
 def _lengths(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, str]]:
     """The path's length, its lower bound and gap, and lengths to compare it with."""
-    path, length = solution.path, solution.length
-    if path is None or length is None:
+    path, value = solution.path, solution.value
+    if path is None or value is None:
         return
     unit = solution.unit
-    yield "value", f"{amount(length, unit)}; what was minimised"
+    yield "value", f"{amount(value, unit)}; what was minimised"
     if solution.lower_bound is not None:
         yield "lower bound", f"{amount(solution.lower_bound, unit)}; {solution.bound_in_words}"
         yield "gap", _gap(solution, target_gap)
     yield from _on_the_ground(path)
+    yield from _switchbacks(path)
     if solution.unrefined is not None:
-        yield "planner's path", _longer(solution.unrefined.length, length, unit)
+        yield "planner's path", _longer(solution.unrefined.value, value, unit)
     assert solution.cost is not None
     yield "planner's cost", amount(solution.cost, unit)
-    yield "straight-line length", amount(solution.straight_length, unit)
-    yield from _contributions(path)
+    if solution.problem.travel is None:
+        yield "straight-line length", amount(solution.straight_length, unit)
+        yield from _contributions(path)
+    else:
+        yield "straight line", amount(solution.straight_value, unit)
     if solution.alternatives:
         others = solution.alternatives[:MOST_ALTERNATIVES]
-        yield "next best", ", ".join(_longer(other.length, length, unit) for other in others)
+        yield "next best", ", ".join(_longer(other.value, value, unit) for other in others)
+
+
+def _travel(problem: Problem) -> Iterator[tuple[str, str]]:
+    """What was minimised in place of length, and where it comes from."""
+    if (travel := problem.travel) is not None:
+        yield "travel model", f"{travel!r}, for each horizontal metre; {travel.source}"
+
+
+def _switchbacks(path: Path) -> Iterator[tuple[str, str]]:
+    """How much of the route is so steep that its value is that of switchbacks."""
+    share = path.in_switchbacks
+    if share > 0.0:
+        yield (
+            "switchbacks",
+            f"{percent(share)} of the route is steeper than the critical grades; there the value "
+            "is that of switchbacks",
+        )
 
 
 def _on_the_ground(path: Path) -> Iterator[tuple[str, str]]:
@@ -99,6 +124,7 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
     surface = problem.surface
     yield "status", f"{solution.status.value} ({solution.stopped_by})"
     yield "planner", solution.planner
+    yield from _travel(problem)
     yield "start", _point(problem, problem.start)
     for x, y in solution.stops[1:-1]:
         yield "via", _point(problem, (x, y))
@@ -107,9 +133,10 @@ def _rows(solution: Solution, target_gap: float | None) -> Iterator[tuple[str, s
         yield "planned in", surface.georeference.name
     yield from _fit(surface)
     for layer in surface.layers:
-        yield f"layer {layer.name}", _weight(layer, surface.unit)
+        if problem.travel is None:
+            yield f"layer {layer.name}", _weight(layer, surface.unit)
     for layer in surface.costs:
-        yield f"cost {layer.name}", _exponent(layer)
+        yield f"cost {layer.name}", _exponent(layer, "length" if problem.travel is None else "pace")
     yield from _corridor(solution)
     yield from _constraints(solution)
     yield from _lengths(solution, target_gap)
@@ -173,10 +200,10 @@ def _weight(layer: Layer, unit: str) -> str:
     return f"a change of {one} counts as {layer.weight:g}{' ' + unit if unit else ''} of travel"
 
 
-def _exponent(layer: Layer) -> str:
+def _exponent(layer: Layer, what: str) -> str:
     """What the value of a cost layer does, in words."""
     power = "" if layer.weight == 1.0 else f" to the power of {layer.weight:g}"
-    return f"its value{power} multiplies the length"
+    return f"its value{power} multiplies the {what}"
 
 
 def _contributions(path: Path) -> Iterator[tuple[str, str]]:

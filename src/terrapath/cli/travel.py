@@ -10,6 +10,7 @@ import typer
 
 from ..errors import InputError
 from .console import ExitCode
+from .options import as_number
 
 if TYPE_CHECKING:
     from ..travel import TravelModel
@@ -32,8 +33,8 @@ def travel_command(
 ) -> int:
     """List the travel models, or show one: its pace, and with the best switchbacks.
 
-    A travel model is what a metre costs in time or energy, uphill and downhill. Planners do not
-    take one yet.
+    A travel model is what a metre costs in time or energy, uphill and downhill. Plan with it by
+    `terrapath plan WHERE --travel MODEL`.
     """
     from ..travel.registry import EXAMPLES, MODELS, by_name
 
@@ -55,12 +56,7 @@ def _option(text: str) -> tuple[str, object]:
     name, equals, value = text.partition("=")
     if not (equals and name and value):
         raise InputError(f"{text!r} is not an option of a model; write NAME=VALUE, as factor=0.6")
-    for kind in (int, float):
-        try:
-            return name, kind(value)
-        except ValueError:
-            continue
-    return name, value
+    return name, as_number(value)
 
 
 def _print_all(models: list[TravelModel]) -> None:

@@ -12,7 +12,7 @@ import shapely
 from .._support.watching import MustStop, never
 from ..distance.field import DistanceField, march_both
 from ..distance.medium import Medium
-from ..errors import tell_unfinished
+from ..errors import InputError, tell_unfinished
 from ..problem import Path, Problem
 from ..space.lattice import Lattice
 from ..validation import Array, require_count, require_positive
@@ -56,6 +56,8 @@ def alternatives(
     Raises InputError for a count or a spacing that is not above 0.
     """
     require_count(count=count)
+    if problem.travel is not None:
+        raise InputError("alternatives are looked for by length and take no travel model yet")
     if spacing is not None:
         require_positive(spacing=spacing)
     if problem.start == problem.goal:

@@ -8,9 +8,13 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Protocol
 
+from ..errors import InputError
 from ..problem import Path, Problem, Solution, Status
 from ..space.lattice import Lattice, Spacing, as_spacing
 from ..validation import require_positive
+
+# The planners that take a travel model.
+TAKES_TRAVEL = "choose rrt-star-r, rrt-star, rrt, dijkstra or a-star"
 
 # Why a search was not needed: it is proven that there is no path.
 SEPARATED = "start and goal lie in different parts of the free space"
@@ -244,13 +248,16 @@ def without_path(
 
 
 def answer_without_search(
-    problem: Problem, planner: str, seed: int | None = None
+    problem: Problem, planner: str, seed: int | None = None, *, takes_travel: bool = False
 ) -> Solution | None:
     """The solution where the start is the goal, or where it is proven that no path exists.
 
     None where a search is needed. Every planner calls this first. So a planner that searches
-    and finds no path only says that it found none; it proves nothing.
+    and finds no path only says that it found none; it proves nothing. takes_travel : whether the
+    planner can minimise what a travel model says; others raise InputError for a problem with one.
     """
+    if not takes_travel:
+        require_metric(problem, f"planner {planner}")
     if problem.start == problem.goal:
         return stay_put(problem, planner, seed)
     started = time.perf_counter()
@@ -259,6 +266,12 @@ def answer_without_search(
     seconds = time.perf_counter() - started
     reason = separated(problem)
     return without_path(problem, planner, Status.UNREACHABLE, reason, seconds=seconds, seed=seed)
+
+
+def require_metric(problem: Problem, what: str, remedy: str = TAKES_TRAVEL) -> None:
+    """Raise InputError where a travel model is given to what knows lengths alone."""
+    if problem.travel is not None:
+        raise InputError(f"{what} minimises length and takes no travel model; {remedy}")
 
 
 def separated(problem: Problem) -> str:

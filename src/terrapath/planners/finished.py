@@ -144,7 +144,9 @@ def with_bound(
     time_limit: float | None = None,
     callback: Callback | None = None,
 ) -> Solution:
-    """The same solution with a proven lower bound on every path's length.
+    """The same solution with a proven lower bound on every path's value.
+
+    With a travel model the bound is the chord: the straight line of constant grade.
 
     target_gap : improve the bound until the gap is no more than this. time_limit : seconds.
     ``callback`` sees each bound, and ends the search for a better one by returning True.
@@ -153,6 +155,8 @@ def with_bound(
     _require_limits(target_gap, time_limit)
     if solution.path is None or _is_proven(solution, target_gap):
         return solution
+    if solution.problem.travel is not None:
+        return _with_chord(solution)
     started, before, watcher = time.perf_counter(), solution.seconds, _Watcher(callback)
     best: Certificate | None = None
 
@@ -180,6 +184,13 @@ def with_bound(
         tell_unfinished("no better bound could be proven", error)
     solution = replace(solution, seconds=before + time.perf_counter() - started)
     return solution if best is None else with_certificate(solution, best)
+
+
+def _with_chord(solution: Solution) -> Solution:
+    """The solution bounded by the chord, which holds whatever is in between."""
+    value = solution.value
+    assert value is not None
+    return replace(solution, lower_bound=min(solution.problem.chord, value))  # rounding apart
 
 
 def with_certificate(solution: Solution, certificate: Certificate) -> Solution:
@@ -212,9 +223,9 @@ def _interrupted(solution: Solution) -> Solution:
 
 
 def _progress(solution: Solution, stage: str, seconds: float) -> Progress:
-    length = math.inf if solution.length is None else solution.length
+    value = math.inf if solution.value is None else solution.value
     count = solution.samples
-    return Progress(count, count, seconds, length, solution.lower_bound or 0.0, stage)
+    return Progress(count, count, seconds, value, solution.lower_bound or 0.0, stage)
 
 
 class _Watcher:

@@ -66,7 +66,7 @@ def path_over_lattices(
         seconds += found.seconds
     paths = [path for path in (found.path, straight) if path is not None]
     ended = found.stopped_by if found.stopped_by in (INTERRUPT, "callback") else ""
-    best = min(paths, key=lambda path: path.length, default=None)
+    best = min(paths, key=lambda path: path.gauged, default=None)
     if not is_rough or best is None or is_over:
         return FirstPath(best, seconds, ended)
     started = time.perf_counter()
@@ -84,10 +84,12 @@ def _shorter(problem: Problem, paths: list[Path], time_limit: float | None) -> P
     from ..geodesics.refinement.lanes import COARSE, STAGES, shortened
 
     must_stop = never if time_limit is None else stop_after(time_limit)
-    field = FastMarching().solve(problem, time_limit=time_limit)
-    found = [*paths] if field.path is None else [*paths, field.path]
+    found = [*paths]
+    if problem.travel is None:
+        field = FastMarching().solve(problem, time_limit=time_limit)
+        found += [] if field.path is None else [field.path]
     for stages, count in ((COARSE, len(found)), (STAGES[2:3], 1)):
-        found.sort(key=lambda path: path.length)
+        found.sort(key=lambda path: path.gauged)
         moved = [shortened(problem, path.points, must_stop, stages) for path in found[:count]]
         found += [problem.path(path.points) for path in moved]
-    return min(found, key=lambda path: path.length)
+    return min(found, key=lambda path: path.gauged)

@@ -25,7 +25,15 @@ from ..geodesics.rays import (
 from ..problem import Path, Problem, Solution, Status
 from ..surface.metric import is_rough
 from ..validation import Array, as_point, require_count, require_positive
-from .base import Callback, Progress, Stopper, answer_without_search, least_limit
+from .base import (
+    TAKES_TRAVEL,
+    Callback,
+    Progress,
+    Stopper,
+    answer_without_search,
+    least_limit,
+    require_metric,
+)
 
 # Rays that pass the goal within this share of the region's side are near it: 0.5 in the paper's
 # region of 12 x 12.
@@ -213,6 +221,9 @@ class GeodesicTraversal:
         ``callback`` sees the progress and stops the planner by returning True. time_limit :
         seconds for this call.
         """
+        require_metric(
+            problem, "geodesic-traversal", f"its rays are geodesics of h; {TAKES_TRAVEL}"
+        )
         answer = answer_without_search(problem, self.name)
         if answer is not None:
             return answer

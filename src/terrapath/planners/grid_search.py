@@ -104,8 +104,9 @@ class Dijkstra:
 class AStar(Dijkstra):
     """Dijkstra's algorithm, directed at the goal: A* (Hart, Nilsson and Raphael 1968).
 
-    Its heuristic is the chord to the goal. No edge is shorter than its chord, so the heuristic is
-    consistent: the cost is the same as Dijkstra's, and fewer vertices are settled.
+    Its heuristic is the chord to the goal; with a travel model that is the straight line of
+    constant grade. No edge is shorter than its chord, so the heuristic is consistent: the cost is
+    the same as Dijkstra's, and fewer vertices are settled.
     """
 
     @property
@@ -158,7 +159,7 @@ class _Search:
 
     @property
     def best_cost(self) -> float:
-        return float(self.graph.places[self.goal, trees.COST])
+        return float(self.graph.places[self.goal, trees.COST]) + self.problem.taken_off
 
     @property
     def settled(self) -> int:
@@ -182,12 +183,12 @@ class _Search:
 
     def relax_row(self, row: int) -> None:
         """Relax the edges from the start to one row of its nodes; after the last, to the goal."""
-        surface, space = self.problem.surface.data, self.problem.free_space.data
+        surface, space = self.problem.priced.data, self.problem.free_space.data
         kernels.relax_around_start(surface, space, self.nodes, self.graph, self.options, row)
 
     def advance(self, most: int) -> None:
         """Settle at most this many vertices."""
-        surface, space = self.problem.surface.data, self.problem.free_space.data
+        surface, space = self.problem.priced.data, self.problem.free_space.data
         kernels.search(surface, space, self.nodes, self.graph, self.options, most)
 
     def sees_a_node(self, point: tuple[float, float], box: Integers) -> bool:
@@ -245,7 +246,7 @@ def _prepare(
         offsets=_offsets(planner.neighbours),
         joins=np.array([NO_NODES, NO_NODES]),
     )
-    graph = _allocate(lattice, problem.surface)
+    graph = _allocate(lattice, problem.priced)
     (x0, y0), (x1, y1) = problem.start, problem.goal
     cells_apart = max(abs(x1 - x0) / lattice.dx, abs(y1 - y0) / lattice.dy)
     options = kernels.Options(
@@ -254,7 +255,7 @@ def _prepare(
         direct=cells_apart <= REACH[planner.neighbours],
     )
     search = _Search(problem, planner, lattice, nodes, graph, options, time_limit)
-    kernels.begin(problem.surface.data, graph, *problem.start, *problem.goal)
+    kernels.begin(problem.priced.data, graph, *problem.start, *problem.goal)
     search.advance(0)
     search.relax_row(-1)  # there is no such row
     kernels.any_node_is_near(problem.free_space.data, nodes, NO_NODES, *problem.start)
@@ -336,7 +337,7 @@ def _search_grid(
 
     Where a lattice shows no path, a finer one may.
     """
-    answer = answer_without_search(problem, planner.name)
+    answer = answer_without_search(problem, planner.name, takes_travel=True)
     if answer is not None:
         return answer
     started = None

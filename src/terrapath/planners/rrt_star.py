@@ -13,6 +13,7 @@ import numpy as np
 from .._kernels.planners import rrt_star as kernels, tree as trees
 from .._kernels.planners.buckets import Buckets
 from .._kernels.planners.sampling import PATH_SHARE
+from .._kernels.travel.priced import is_directed, least_price
 from ..problem import History, Path, Problem, SearchTree, Solution
 from ..problem.path import sampled
 from ..surface import Surface
@@ -64,7 +65,7 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     least = 2.0 * math.sqrt(1.5 / math.pi)
     panel, tolerance = options.panel or FEATURES_PER_PANEL * problem.surface.resolution, 0.0
     is_open = options.panel is None and options.informed and options.riemannian
-    if is_open and is_rough(problem.surface, bounds):
+    if is_open and is_rough(problem.priced, bounds):
         panel, tolerance = ROUGH_FEATURES * problem.surface.resolution, ROUGH_TOLERANCE
     return trees.Options(
         *bounds,
@@ -86,6 +87,7 @@ def _allocate(samples: int, surface: Surface, branch: Array | None = None) -> tr
     # The start, the first branch, and the goal that may join with the last sample.
     size = samples + 2 + len(branch)
     most = size // 2 + 64  # buckets
+    directions = 2 if is_directed(surface.data) else 1
     return trees.Tree(
         places=np.empty((size, trees.LIFTED + len(surface.layers))),
         vertices=np.empty(size, trees.TENSOR),
@@ -99,8 +101,9 @@ def _allocate(samples: int, surface: Surface, branch: Array | None = None) -> tr
             shape=np.zeros(2, np.int64),
         ),
         floor=surface.least_cost,
+        least=surface.least_cost * least_price(surface.data),
         branch=branch,
-        near=np.empty(size, trees.CANDIDATE),
+        near=np.empty(directions * size, trees.CANDIDATE),
         queue=np.empty(size, np.int32),
     )
 
@@ -127,7 +130,8 @@ class _Search:
 
     @property
     def best_cost(self) -> float:
-        return float(self.tree.places[self.goal, trees.COST]) if self.goal >= 0 else math.inf
+        cost = self.tree.places[self.goal, trees.COST] if self.goal >= 0 else math.inf
+        return float(cost) + self.problem.taken_off
 
     @property
     def samples(self) -> int:
@@ -141,14 +145,8 @@ class _Search:
 
     def grow(self, draws: Array) -> None:
         kernels.grow(
-            self.problem.surface.data, self.problem.free_space.data, self.tree, self.settings, draws
+            self.problem.priced.data, self.problem.free_space.data, self.tree, self.settings, draws
         )
-
-
-def _prepare(problem: Problem, tree: trees.Tree, settings: trees.Options) -> None:
-    """Plant the tree; so the kernels are loaded, or compiled, before the clock starts."""
-    surface, space = problem.surface.data, problem.free_space.data
-    kernels.grow(surface, space, tree, settings, np.empty((0, 3)))
 
 
 def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
@@ -235,8 +233,8 @@ def _first_path(
     if not options.informed:
         return FirstPath(None)
     started, straight = time.perf_counter(), straight_path(problem)
-    least = float(chord(problem.surface, problem.start, problem.goal))
-    if straight is not None and straight.length <= DEAR * least:
+    least = float(chord(problem.priced, problem.start, problem.goal))
+    if straight is not None and straight.gauged <= DEAR * least:
         return FirstPath(straight, time.perf_counter() - started)
     from .first_path import path_over_lattices
 
@@ -250,9 +248,9 @@ def _best(search: _Search) -> tuple[Path | None, float | None]:
     """
     path, first = _path(search.problem, search.tree), search.first.path
     if path is None:
-        return first, None if first is None else first.length
-    if first is not None and search.options.riemannian and first.length < path.length:
-        return first, first.length
+        return first, None if first is None else first.value
+    if first is not None and search.options.riemannian and first.gauged < path.gauged:
+        return first, first.value
     return path, search.best_cost
 
 
@@ -281,15 +279,16 @@ def _counters(tree: trees.Tree) -> dict[str, int]:
 
 def search_tree(problem: Problem, options: TreeOptions, callback: Callback | None) -> Solution:
     """Grow a tree from the start until an option's limit is met or the callback stops it."""
-    answer = answer_without_search(problem, options.planner, options.seed)
+    answer = answer_without_search(problem, options.planner, options.seed, takes_travel=True)
     if answer is not None:
         return answer
     settings = _kernel_options(problem, options)
     first = _first_path(problem, options, callback, settings.tolerance > 0.0)
     root = first.branch or first.path
     branch = None if root is None else sampled(root.points, settings.step)
-    tree = _allocate(options.samples, problem.surface, branch)
-    _prepare(problem, tree, settings)
+    tree = _allocate(options.samples, problem.priced, branch)
+    # The tree is planted, so that the kernels are loaded, or compiled, before the clock starts.
+    _Search(problem, options, settings, tree, first).grow(np.empty((0, 3)))
     search = _Search(problem, options, settings, tree, first)
     stopped_by = _run(search, callback)
     seconds = search.seconds

@@ -93,7 +93,7 @@ def plan_goals(
     ends = [problem.checked(goal, _goal_name(goals, k)) for k, goal in enumerate(goals)]
     tour = _Tour(problem, planner, callback, len(ends))
     stops = [problem.start, *tour.checked(via)]
-    chords = [metric.chord_through(problem.surface, [*stops, end]) for end in ends]
+    chords = [chord_through(problem, [*stops, end]) for end in ends]
     found: dict[int, GoalAnswer] = {}
     best, stopped = math.inf, False
     for k in sorted(range(len(ends)), key=chords.__getitem__):
@@ -101,7 +101,7 @@ def plan_goals(
         if not stopped and (every or chords[k] < best):
             solution = tour.solve([*stops[1:], ends[k]])
             stopped = solution.status is Status.INTERRUPTED
-            best = min(best, math.inf if solution.length is None else solution.length)
+            best = min(best, math.inf if solution.value is None else solution.value)
         found[k] = GoalAnswer(goal=ends[k], least=_least(chords[k], solution), solution=solution)
     return tuple(found[k] for k in range(len(ends)))
 
@@ -114,10 +114,10 @@ def nearest(answers: Iterable[GoalAnswer]) -> Solution:
     """
     known = list(answers)
     planned = [answer.solution for answer in known if answer.solution is not None]
-    found = [solution for solution in planned if solution.length is not None]
+    found = [solution for solution in planned if solution.value is not None]
     if not found:
         return max(planned, key=lambda s: (s.status is Status.INTERRUPTED, -_badness(s)))
-    best = min(found, key=lambda solution: solution.length or 0.0)
+    best = min(found, key=lambda solution: solution.value or 0.0)
     stopped = any(solution.status is Status.INTERRUPTED for solution in planned)
     if stopped and best.status is Status.SOLVED:
         best = replace(best, status=Status.INTERRUPTED, stopped_by=INTERRUPT)
@@ -140,8 +140,9 @@ def _least(chord: float, solution: Solution | None) -> float:
         return chord
     if solution.status is Status.UNREACHABLE:
         return math.inf
-    least = max(chord, solution.lower_bound or 0.0)
-    return least if solution.length is None else min(least, solution.length)  # rounding apart
+    proven = solution.lower_bound
+    least = chord if proven is None else max(chord, proven)
+    return least if solution.value is None else min(least, solution.value)  # rounding apart
 
 
 class _Tour:
@@ -244,9 +245,17 @@ def joined(problem: Problem, legs: Sequence[Solution], count: int) -> Solution:
         legs=tuple(legs),
     )
     proven = [leg.lower_bound for leg in legs if leg.lower_bound is not None]
-    if solution.length is None or len(proven) < len(legs):
+    if solution.value is None or len(proven) < len(legs):
         return solution
-    return replace(solution, lower_bound=min(sum(proven), solution.length))  # rounding apart
+    return replace(solution, lower_bound=min(sum(proven), solution.value))  # rounding apart
+
+
+def chord_through(problem: Problem, stops: Sequence[Point]) -> float:
+    """What no path through all the stops costs less than, by chords, in the problem's unit."""
+    least = metric.chord_through(problem.priced, stops)
+    if problem.pricing is None:
+        return least
+    return least + problem.pricing.taken_off(stops[0], stops[-1])
 
 
 def _reasons(legs: Sequence[Solution], count: int) -> str:

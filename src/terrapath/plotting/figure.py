@@ -13,7 +13,7 @@ from .._support.files import written_whole
 from ..distance.field import DistanceField
 from ..errors import MapError
 from ..problem import Solution
-from ..surface.ground import is_weighted, quantity, value_unit
+from ..surface.ground import quantity, value_unit
 from ..travel import TravelModel
 from .elevation import chart_size, draw_charts
 from .field_view import draw_distances
@@ -38,15 +38,15 @@ def _title(solution: Solution, width: int) -> str:
 
 
 def _lines(solution: Solution) -> Iterator[str]:
-    problem, length = solution.problem, solution.length
+    problem, value = solution.problem, solution.value
     name = f"{in_words(problem.name)}: " if problem.name else ""
     samples = f"{solution.samples:,} samples"
-    if length is None:
+    if value is None:
         yield f"{name}{nothing_in_words(solution)} ({samples})"
         return
-    straight = solution.straight_length
-    saved = 1.0 - length / straight if straight else 0.0
-    less, more = ("less", "more") if is_weighted(problem.surface) else ("shorter", "longer")
+    straight = solution.straight_value
+    saved = 1.0 - value / straight if straight else 0.0
+    less, more = ("less", "more") if solution.is_weighted else ("shorter", "longer")
     against = (
         f"{100.0 * abs(saved):.1f} % {less if saved >= 0.0 else more} than the "
         f"{straight_name(solution)}"

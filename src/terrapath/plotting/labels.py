@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from ..io.routes.profile import clean
 from ..problem import Problem, Solution, Status
-from ..surface.ground import is_weighted
+from ..surface.georeference import in_hours, in_watt_hours
 
 # Longer axes are in kilometres; metres.
 LONGEST_IN_METRES = 10_000.0
@@ -24,7 +24,9 @@ def with_unit(name: str, unit: str, gap: str = " ") -> str:
 
 def format_length(length: float, unit: str) -> str:
     """A length with its unit, as titles and legends show it."""
-    return f"{length:{'.4f' if length < 1000.0 else ',.0f'}} {unit}".rstrip()
+    text = f"{length:{'.4f' if length < 1000.0 else ',.0f'}} {unit}".rstrip()
+    others = {"s": in_hours, "J": in_watt_hours}
+    return f"{others[unit](length)} ({text})" if unit in others else text
 
 
 def lengths_in_words(solution: Solution) -> str:
@@ -32,9 +34,9 @@ def lengths_in_words(solution: Solution) -> str:
     path = solution.path
     assert path is not None
     ground = format_length(path.ground_length, path.ground_unit)
-    if path.ground_length == path.length and not is_weighted(path.surface):
+    if path.ground_length == path.length and not solution.is_weighted:
         return f"length {ground}"
-    return f"{ground} on the ground, value {format_length(path.length, solution.unit)}"
+    return f"{ground} on the ground, value {format_length(path.value, solution.unit)}"
 
 
 def nothing_in_words(solution: Solution) -> str:

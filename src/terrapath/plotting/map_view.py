@@ -172,7 +172,7 @@ def _draw_alternatives(axes: Any, solution: Solution) -> None:
     halo = [patheffects.withStroke(linewidth=2.8, foreground="white", alpha=0.8)]
     for path, colour in zip(solution.alternatives, ALTERNATIVE_COLOURS, strict=False):
         style = {"color": colour, "lw": 1.5, "ls": (0, (5, 2)), "path_effects": halo}
-        label = f"next best, {format_length(path.length, solution.unit)}"
+        label = f"next best, {format_length(path.value, solution.unit)}"
         axes.plot(*path.points.T, zorder=4.5, label=label, **style)
 
 

@@ -242,7 +242,7 @@ def _route_traces(stage: Stage) -> list[Any]:
     )
     traces = []
     for route, colour in zip(solution.alternatives, ALTERNATIVE_COLOURS, strict=False):
-        name = f"next best, {format_length(route.length, escape(solution.unit))}"
+        name = f"next best, {format_length(route.value, escape(solution.unit))}"
         line = {"color": colour, "width": 4, "dash": "dash"}
         points = route.profile.points[_drawn_indices(route)]
         traces.append(
@@ -291,7 +291,7 @@ def _marks(stage: Stage) -> list[Any]:
 
 
 def _title(solution: Solution) -> str:
-    unit, length = solution.unit, solution.length
+    unit, length = solution.unit, solution.value
     name = f"{solution.problem.name}: " if solution.problem.name else ""
     if length is None:
         return f"{name}{nothing_in_words(solution)}"

@@ -11,11 +11,12 @@ import numpy.typing as npt
 import shapely
 
 from ..surface import Surface, metric
-from ..surface.ground import Ground, ground_of
+from ..surface.ground import Ground, ground_of, value_unit
 from ..validation import Array
 
 if TYPE_CHECKING:
     from ..space.free_space import FreeSpace
+    from .pricing import Pricing
 
 Indices: TypeAlias = npt.NDArray[np.intp]
 
@@ -26,6 +27,8 @@ PER_FEATURE = 8.0
 LEAST_SAMPLES = 256
 # Pieces whose slope is at least this share of the largest are looked at more closely.
 NEAR_LARGEST = 0.9
+# A grade this much beyond another, as a share, is no steeper: it comes from rounding.
+ROUNDING_OF_GRADES = 1e-6
 CLOSER = 16
 
 
@@ -53,15 +56,18 @@ def _counts(points: Array, finest: float) -> Indices:
 class Path:
     """A polyline on the plane, and the curve on the surface above it.
 
-    surface : the surface. points : (m, 2), map units, from start to goal.
+    surface : the surface. points : (m, 2), map units, from start to goal. pricing : what it costs
+    under a travel model; None without one.
 
-    ``length`` is what is minimised, with the weights and costs of all layers. The numbers for
+    ``length`` is the length under h, with the weights and costs of all layers, and ``value`` is
+    what is minimised: the length, or what the travel model makes of the path. The numbers for
     people are those on the ground, height at its true scale, in ``ground_unit``: metres on maps,
     else the unit of the map. Slopes are rise over horizontal distance: 1 is 45 degrees.
     """
 
     surface: Surface
     points: Array
+    pricing: Pricing | None = field(default=None, repr=False)
     # Where it has been tested, so that it is tested once.
     _free_in: FreeSpace | None = field(default=None, init=False, repr=False)
 
@@ -69,6 +75,40 @@ class Path:
     def length(self) -> float:
         """True length under h, map units, to 1e-9 relative."""
         return metric.curve_length(self.surface, self.points)
+
+    @cached_property
+    def gauged(self) -> float:
+        """What paths with the same ends are compared by, above 0; see ``TravelModel.gauge``.
+
+        It is the value, without what the gauge of a travel model takes off between the ends.
+        """
+        return self.length if self.pricing is None else self.pricing.gauged(self.points)
+
+    @property
+    def value(self) -> float:
+        """What is minimised, in ``unit``, to 1e-9 relative: the length, or the cost of travel.
+
+        A travel model's best switchbacks are taken where the path is steeper than its critical
+        grades.
+        """
+        if self.pricing is None:
+            return self.length
+        return self.gauged + self.pricing.taken_off(self.points[0], self.points[-1])
+
+    @property
+    def unit(self) -> str:
+        """The unit of ``value``."""
+        return value_unit(self.surface) if self.pricing is None else self.pricing.model.unit
+
+    @cached_property
+    def in_switchbacks(self) -> float:
+        """The share of the path, on the plane, that is steeper than the travel model's grades.
+
+        There the value is that of switchbacks at the critical grade. 0 without a travel model.
+        """
+        if self.pricing is None:
+            return 0.0
+        return share_outside(self.ground, self.points, self.pricing.model.critical)
 
     @cached_property
     def line(self) -> shapely.LineString:
@@ -82,9 +122,12 @@ class Path:
         points = sampled(self.points, finest)
         corners = np.concatenate([[0], np.cumsum(_counts(self.points, finest))])
         points[corners] = self.points  # despite rounding
-        value = _cumulative(self.surface, points)
-        under = self.ground.surface
-        distance = value if under is self.surface else _cumulative(under, points)
+        under, pricing = self.ground.surface, self.pricing
+        distance = _cumulative(under, points)
+        if pricing is not None:
+            value = pricing.values(points)
+        else:
+            value = distance if under is self.surface else _cumulative(self.surface, points)
         values, costs = self.surface.values(points), self.surface.cost_values(points)
         return Profile(points, corners, self.ground.metres * distance, value, values, costs)
 
@@ -173,7 +216,7 @@ class Profile(NamedTuple):
     points: Array  # (m, 2), map units
     corners: Indices  # (k,), which of them are the points of the path
     distance: Array  # (m,), on the ground from the start, ground units
-    value: Array  # (m,), length under h from the start, map units
+    value: Array  # (m,), what is minimised, from the start, in the path's ``unit``
     values: Array  # (m, layers), in the layers' units
     costs: Array  # (m, costs), the factors of the cost layers, without weights
 
@@ -252,6 +295,20 @@ def relief_along(ground: Ground, points: Array) -> Relief:
     up, down = pieces.rises
     along, across = (_largest(ground, pieces, k) for k in (0, 1))
     return Relief(ground.metres * float(up.sum()), ground.metres * float(down.sum()), along, across)
+
+
+def share_outside(ground: Ground, points: Array, grades: tuple[float, float]) -> float:
+    """The share of a polyline (m, 2), on the plane, whose grade is outside a range."""
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    if length == 0.0:
+        return 0.0
+    finest = min(ground.surface.resolution / PER_FEATURE, length / LEAST_SAMPLES)
+    samples = sampled(points, finest)
+    sizes = np.hypot(*np.diff(samples, axis=0).T)
+    rises = np.diff(ground.height_scale * ground.surface.values(samples)[:, 0])
+    low, high = (1.0 + ROUNDING_OF_GRADES) * np.array(grades)
+    outside = (rises < low * sizes) | (rises > high * sizes)
+    return float(sizes[outside].sum() / sizes.sum())
 
 
 def _largest(ground: Ground, pieces: Pieces, which: int) -> float:

@@ -16,12 +16,15 @@ from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import Spacing, default_spacing
 from ..surface import Mask, Surface, metric
 from ..surface.bounds import Bounds, Cells, as_bounds
+from ..surface.ground import value_unit
 from ..validation import Point, PointLike, as_point, require_not_negative
 from .path import Path
 
 if TYPE_CHECKING:
     from ..space.constraints import Area, Constraints
     from ..space.slope_limit import SlopeMeasure
+    from ..travel import TravelModel
+    from .pricing import Pricing
 
 
 def as_text(point: Point) -> str:
@@ -41,6 +44,9 @@ class Problem:
     its weight, is steeper. slope_measure : "horn", the slope of a cell as GIS tools compute it, or
     "steepest", that of the steepest place in it. keep_in : shapely polygon or polygons that the
     vehicle must not leave.
+    travel : what is minimised in place of length: a TravelModel, or the name of one. The grade is
+    that of the height at its true scale, cost layers multiply the pace, and no other layer may cost
+    by its change.
     snap : map units. Start and goal that are not on free ground are moved to the nearest that is,
     no farther than this, with a ``SnapWarning``; by default they are refused. name : shown in
     reports.
@@ -62,6 +68,7 @@ class Problem:
         max_slope: float | None = None,
         slope_measure: SlopeMeasure = "horn",
         keep_in: Area | None = None,
+        travel: TravelModel | str | None = None,
         snap: float = 0.0,
         name: str = "",
         show: Callable[[Point], str] = as_text,
@@ -84,9 +91,45 @@ class Problem:
         self.max_slope = max_slope
         self.slope_measure = slope_measure
         self.keep_in = keep_in
+        self.pricing = None if travel is None else self._priced(travel)
         self.free_space = self._free_space()
         self.start = self.checked(start, "start")
         self.goal = self.start if goal is start else self.checked(goal, "goal")
+
+    def _priced(self, travel: TravelModel | str) -> Pricing:
+        from .pricing import Pricing
+
+        pricing = Pricing.of(self.surface, travel)
+        pricing.require_known(self.bounds)
+        return pricing
+
+    @property
+    def travel(self) -> TravelModel | None:
+        """The travel model; None where length is minimised."""
+        return None if self.pricing is None else self.pricing.model
+
+    @property
+    def priced(self) -> Surface:
+        """The surface as planners measure it: under h, or with the pace of the travel model.
+
+        With a pace its lengths are costs of travel, and count in their direction.
+        """
+        return self.surface if self.pricing is None else self.pricing.surface
+
+    @property
+    def unit(self) -> str:
+        """The unit of what is minimised."""
+        return value_unit(self.surface) if self.pricing is None else self.pricing.model.unit
+
+    @property
+    def taken_off(self) -> float:
+        """What the gauge of a travel model takes off every path from start to goal."""
+        return 0.0 if self.pricing is None else self.pricing.taken_off(self.start, self.goal)
+
+    @property
+    def chord(self) -> float:
+        """What no path from start to goal costs less than, without any search, in ``unit``."""
+        return float(metric.chord(self.priced, self.start, self.goal)) + self.taken_off
 
     def _free_space(self) -> FreeSpace:
         limits = (self.surface.nodata, self.max_slope, self.keep_in)
@@ -176,7 +219,7 @@ class Problem:
 
     def path(self, points: npt.ArrayLike) -> Path:
         """The path on this problem's surface through points (m, 2), map units."""
-        return Path(self.surface, np.asarray(points, np.float64))
+        return Path(self.surface, np.asarray(points, np.float64), self.pricing)
 
     def allows(self, path: Path | npt.ArrayLike) -> bool:
         """Does a path, given by its points (m, 2), stay in the bounds and touch no obstacle?
@@ -219,6 +262,13 @@ class Problem:
     def straight_length(self) -> float:
         """Length on the surface of the straight line from start to goal, through all obstacles."""
         return metric.curve_length(self.surface, [self.start, self.goal])
+
+    @property
+    def straight_value(self) -> float:
+        """The value of that line, in ``unit``."""
+        if self.pricing is None:
+            return self.straight_length
+        return self.path([self.start, self.goal]).value
 
     @cached_property
     def is_unreachable(self) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..surface.ground import is_weighted, value_unit
+from ..surface.ground import is_weighted
 from ..validation import Array
 from .path import Path
 
@@ -120,12 +120,12 @@ class Solution:
     planner: str  # its name
     status: Status  # how the planner ended
     path: Path | None
-    cost: float | None  # map units
+    cost: float | None  # in ``unit``
     seconds: float  # planning took, with refinement and bound
     samples: int = 0  # samples drawn, nodes settled or rays traced
     seed: int | None = None  # None for planners that draw no random numbers
     stopped_by: str = ""  # what ended the search, in words
-    lower_bound: float | None = None  # on the length of every path, map units
+    lower_bound: float | None = None  # on the value of every path, in ``unit``
     alternatives: tuple[Path, ...] = ()  # further paths, shortest first
     unrefined: Path | None = None  # the planner's own path, where it was refined
     certificate: Proof | None = None  # the proof of the lower bound
@@ -164,23 +164,37 @@ class Solution:
     @property
     def value(self) -> float | None:
         """What is minimised, measured on the path returned, in ``unit``, to 1e-9 relative."""
-        return self.length
+        return None if self.path is None else self.path.value
+
+    @property
+    def relaxed_value(self) -> float | None:
+        """The value with the best switchbacks of the travel model, which the bound is compared to.
+
+        Switchbacks are not laid out, so it is the value.
+        """
+        return self.value
 
     @property
     def unit(self) -> str:
-        """The unit of ``value``: that of the map, or "weighted m" with weights, layers or costs."""
-        return value_unit(self.problem.surface)
+        """The unit of ``value``: the travel model's; without one that of the map.
+
+        It is "weighted m" with weights, layers or costs.
+        """
+        return self.problem.unit
 
     @property
     def gap(self) -> float | None:
-        """(length - lower_bound) / lower_bound; infinite where the lower bound is 0."""
-        if self.length is None or self.lower_bound is None:
+        """(value - lower_bound) / lower_bound; infinite where the lower bound is 0.
+
+        Where energy is gained on the way, the bound is below 0, and its size counts.
+        """
+        if self.value is None or self.lower_bound is None:
             return None
-        if self.length == self.lower_bound:
+        if self.value == self.lower_bound:
             return 0.0
         if self.lower_bound == 0.0:
             return math.inf
-        return (self.length - self.lower_bound) / self.lower_bound
+        return (self.value - self.lower_bound) / abs(self.lower_bound)
 
     @property
     def stops(self) -> Array:
@@ -194,6 +208,11 @@ class Solution:
         return sum(leg.problem.straight_length for leg in self.legs or (self,))
 
     @property
+    def straight_value(self) -> float:
+        """The value of those lines, in ``unit``."""
+        return sum(leg.problem.straight_value for leg in self.legs or (self,))
+
+    @property
     def via(self) -> Array:
         """(k, 2): the stops between start and goal, map units; none where there is no path."""
         return self.stops[1:-1] if self.path is not None else np.empty((0, 2))
@@ -203,8 +222,13 @@ class Solution:
         """What the lower bound says, in words, such as "no path is shorter"."""
         which = " through these points" if self.legs else ""
         where = "" if self.corridor is None else " in the corridor"
-        verb = "costs less" if is_weighted(self.problem.surface) else "is shorter"
+        verb = "costs less" if self.is_weighted else "is shorter"
         return f"no path{which}{where} {verb}"
+
+    @property
+    def is_weighted(self) -> bool:
+        """Is the value something else than the length on the ground?"""
+        return self.problem.pricing is not None or is_weighted(self.problem.surface)
 
     @property
     def gap_in_words(self) -> str:
@@ -216,14 +240,19 @@ class Solution:
         text = f"{100.0 * self.gap:.3g} %"
         if self.gap <= LARGE_GAP:
             return text
-        less = "cost {} less" if is_weighted(self.problem.surface) else "be {} shorter"
+        less = "cost {} less" if self.is_weighted else "be {} shorter"
         saving = less.format(f"{100.0 * self.gap / (1.0 + self.gap):.3g} %")
         return f"{text}, which proves little: the best path may {saving}"
 
     def __repr__(self) -> str:
-        length = "no path" if self.length is None else f"length {self.length:.6f}"
+        if self.value is None:
+            value = "no path"
+        elif self.problem.travel is None:
+            value = f"length {self.value:.6f}"
+        else:
+            value = f"{self.value:.6f} {self.unit}"
         return (
-            f"Solution({self.planner}: {self.status.value}, {length}, "
+            f"Solution({self.planner}: {self.status.value}, {value}, "
             f"{self.samples} samples, {self.seconds:.3f} s)"
         )
 
@@ -238,7 +267,7 @@ def _kept(problem: Problem, path: Path | None) -> Path | None:
         from .mending import mended
 
         points = mended(space, path.points)
-        kept = None if points is None else Path(path.surface, points)
+        kept = None if points is None else Path(path.surface, points, path.pricing)
     if kept is not None:
         object.__setattr__(kept, "_free_in", space)
     return kept

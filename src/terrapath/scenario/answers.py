@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, TerrapathWarning, collecting
 from ..planners.base import PROVING, Callback, Progress
-from ..surface.ground import value_unit
 from .option import Point
 from .question import Itinerary, Question, open_question
 from .scenario import Scenario, require_scenario
@@ -175,6 +174,11 @@ def _require_agreement(scenario: Scenario) -> None:
     ):
         if value is not None and not planner.bound:
             raise InputError(f"{option} needs a lower bound; leave out either it or --no-bound")
+    if scenario.travel.model is not None and output.certificate is not None:
+        raise InputError(
+            "--certificate: with a travel model the lower bound is a chord, which needs no proof "
+            "in a file; leave it out"
+        )
     if scenario.route.all_goals and len(scenario.route.goals) < 2:
         raise InputError("--all-goals reports several goals; give --goal more than once")
 
@@ -212,6 +216,7 @@ def is_planned_in_corridor(scenario: Scenario, cells: int) -> bool:
     for what, is_given in (
         ("several goals", len(scenario.route.goals) > 1),
         ("--certificate", scenario.output.certificate is not None),
+        ("--travel", scenario.travel.model is not None),
     ):
         if is_given:
             raise InputError(
@@ -277,9 +282,10 @@ class _Run:
         problem : None where it is made later, from a part of a map.
         """
         surface = None if problem is None else problem.surface
-        unit = "" if surface is None else value_unit(surface)
+        unit = "" if problem is None else problem.unit
         watch = None if self.watch is None else _with_unit(self.watch, unit)
-        if not (self.planner.bound or self.planner.target_gap is not None):
+        is_proven = self.planner.bound or self.planner.target_gap is not None
+        if not is_proven or self.question.scenario.travel.model is not None:
             yield watch
             return
         from .._kernels.second_core import SecondCore, rehearsal_name

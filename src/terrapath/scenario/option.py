@@ -21,6 +21,7 @@ Rectangle: TypeAlias = tuple[float, float, float, float]
 Files: TypeAlias = tuple[str, ...]
 Interval: TypeAlias = tuple[float, float]
 Extent: TypeAlias = float | Literal["auto", "none"]
+ModelOptions: TypeAlias = dict[str, float | str]
 SlopeMeasure: TypeAlias = Literal["horn", "steepest"]
 
 # What a value has to be, in words.
@@ -124,7 +125,8 @@ class Declared(NamedTuple):
     @property
     def keyword(self) -> str:
         """Its name as a keyword in Python."""
-        return {"name": "planner", "files": "output"}.get(self.key, self.key)
+        others = {"name": "planner", "files": "output", "model": "travel"}
+        return "travel_options" if self.key == "options" else others.get(self.key, self.key)
 
 
 @functools.cache

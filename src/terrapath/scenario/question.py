@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from ..surface import Surface
     from ..surface.bounds import Bounds
     from ..surface.georeference import Georeference
+    from ..travel import TravelModel
 
 
 class Place(NamedTuple):
@@ -138,11 +139,25 @@ class Question:
             radius=limits.radius,
             max_slope=limits.max_slope,
             slope_measure=limits.slope_measure,
+            travel=self._travel(),
             snap=self.scenario.route.snap,
             show=OwnCoordinates(place.surface.georeference, self.scenario.route.latlon),
             keep_in=self._area(place.surface, corridor),
             name=place.name,
         )
+
+    def _travel(self) -> TravelModel | None:
+        wanted = self.scenario.travel
+        if wanted.model is None:
+            if wanted.options:
+                raise InputError(
+                    f"--travel-option {next(iter(wanted.options))}: no travel model is chosen; "
+                    "give --travel NAME"
+                )
+            return None
+        from ..travel import by_name
+
+        return by_name(wanted.model, **wanted.options)
 
     def _obstacles(self, surface: Surface) -> list[BaseGeometry]:
         files = self.scenario.constraints.obstacles

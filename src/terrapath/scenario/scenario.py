@@ -24,7 +24,13 @@ from .option import (
     a_switch,
     declared,
 )
-from .sections import ConstraintsSection, OutputSection, PlannerSection, RouteSection
+from .sections import (
+    ConstraintsSection,
+    OutputSection,
+    PlannerSection,
+    RouteSection,
+    TravelSection,
+)
 
 # Values by section and key.
 Given: TypeAlias = Mapping[str, Mapping[str, object]]
@@ -178,6 +184,7 @@ SECTIONS: Mapping[str, type] = {
     "map": MapSection,
     "route": RouteSection,
     "constraints": ConstraintsSection,
+    "travel": TravelSection,
     "planner": PlannerSection,
     "output": OutputSection,
 }
@@ -199,6 +206,7 @@ class Scenario:
     map: MapSection = field(default_factory=MapSection)
     route: RouteSection = field(default_factory=RouteSection)
     constraints: ConstraintsSection = field(default_factory=ConstraintsSection)
+    travel: TravelSection = field(default_factory=TravelSection)
     planner: PlannerSection = field(default_factory=PlannerSection)
     output: OutputSection = field(default_factory=OutputSection)
 

@@ -8,7 +8,7 @@ typer reads them to print the help; pydantic is imported when there are values t
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
 from .option import (
@@ -17,6 +17,7 @@ from .option import (
     WHOLE,
     Extent,
     Files,
+    ModelOptions,
     Option,
     Point,
     Points,
@@ -138,6 +139,35 @@ class ConstraintsSection:
             "A vector file of the area that the route may not leave, in any CRS.", '"area.geojson"'
         ),
     ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class TravelSection:
+    """Time or energy, to be minimised in place of length."""
+
+    __pydantic_config__: ClassVar[dict[str, str | bool]] = STRICT
+
+    model: Annotated[
+        str | None,
+        Option(
+            "Minimise time or energy by this travel model: tobler, naismith, langmuir, "
+            "irmischer_clarke, campbell, minetti, pandolf, llobera_sluckin or vehicle; see "
+            "`terrapath travel` [default: minimise length].",
+            "the name of a travel model, as text",
+            form="MODEL",
+            flags=("--travel",),
+            example='"tobler"',
+        ),
+    ] = None
+    options: Annotated[
+        ModelOptions,
+        Option(
+            "An option of the travel model, as factor=0.6 or mass=900; may be repeated.",
+            "a table of numbers and texts, NAME = VALUE",
+            form="NAME=VALUE",
+            flags=("--travel-option",),
+        ),
+    ] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,6 +32,8 @@ HEIGHT_WORDS = ("height", "elevation", "altitude", "dem", "dtm", "dsm", "topogra
 DERIVED_WORDS = ("slope", "aspect", "rough", "shade", "curvature", "error", "count")
 # Start and goal are guessed among a grid of places; this many lie along each side of the map.
 PLACES = 9
+# An entry of each table that is not of layers.
+TABLES = {"weights": "height = 1.0", "options": "factor = 0.6"}
 WIDTH = 88
 
 Values = Mapping[tuple[str, str], str]
@@ -274,8 +276,8 @@ def _as_toml(value: object) -> str:
 
 def _table(entry: Declared, bands: list[str]) -> list[str]:
     lines = _comment(entry.option.help.replace("; may be repeated", ""))
-    if entry.key == "weights":
-        return [*lines, f"# [{entry.section}.weights]", "# height = 1.0"]
+    if entry.key in TABLES:
+        return [*lines, f"# [{entry.section}.{entry.key}]", f"# {TABLES[entry.key]}"]
     if entry.key == "layers" and bands:
         return [*lines, *bands]
     return [*lines, *_layer(entry.key, "NAME", "layer.tif", 1)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import TYPE_CHECKING
@@ -41,9 +42,27 @@ def metres_of(unit: str) -> float | None:
 
 
 def amount(value: float, unit: str) -> str:
-    """A number with its unit: three digits after the point from 1,000 on, six below."""
+    """A number with its unit: three digits after the point from 1,000 on, six below.
+
+    Seconds are also given in hours and minutes, joules in watt-hours.
+    """
     digits = ",.3f" if abs(value) >= 1000.0 else ".6f"
-    return f"{value:{digits}} {unit}".rstrip()
+    text = f"{value:{digits}} {unit}".rstrip()
+    others = {"s": in_hours, "J": in_watt_hours}
+    return f"{others[unit](value)} ({text})" if unit in others else text
+
+
+def in_hours(seconds: float) -> str:
+    """A time as hours and minutes, h:min."""
+    if not math.isfinite(seconds):
+        return f"{seconds} h"
+    minutes = round(abs(seconds) / 60.0)
+    return f"{'-' if seconds < 0.0 and minutes else ''}{minutes // 60}:{minutes % 60:02d} h"
+
+
+def in_watt_hours(joules: float) -> str:
+    """An energy in watt-hours, four digits."""
+    return f"{joules / 3600.0:,.4g} Wh"
 
 
 def parse_crs(text: object, name: str = "the CRS") -> CRS | None:

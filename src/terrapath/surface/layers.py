@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from .._kernels.surface.cells import NO_CELLS, CostCells
 from .._kernels.surface.surfaces import Peaks, Spline
+from .._kernels.travel.priced import PricedSpline
 from .._support.memory import blocks
 from ..errors import InputError
 from ..validation import Array, require_choice, require_not_negative
 from .bounds import Bounds
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
 
 Kind = Literal["rise", "cost", "cells"]
 
@@ -101,10 +105,15 @@ def _steepest_of(coefficients: Array, dx: float, dy: float) -> float:
     return steepest
 
 
+def is_spline(data: Peaks | Spline) -> TypeIs[Spline]:
+    """Is it a spline and no exact peaks, with a pace or without?"""
+    return isinstance(data, Spline | PricedSpline)
+
+
 def _steepest(data: Peaks | Spline) -> float:
     """An upper bound on the weighted slope of every layer, layer units/map unit."""
     with np.errstate(over="ignore"):
-        if isinstance(data, Peaks):
+        if not is_spline(data):
             amplitude, falloff = np.abs(data.peaks[:, 0]), data.peaks[:, 1]
             weights = np.repeat(data.weights, np.diff(data.first))
             slopes = weights * amplitude * np.sqrt(2.0 * falloff / math.e)
@@ -144,7 +153,7 @@ LARGEST_COST = 1e12
 
 def require_cost_range(data: Peaks | Spline) -> None:
     """Raise InputError where the product of all costs is beyond 1e-12 to 1e12."""
-    if not isinstance(data, Spline):
+    if not is_spline(data):
         return
     ranges = [(float(k.min()), float(k.max())) for k in _logs(data)]
     low, high = (math.fsum(ends) for ends in zip(*ranges, strict=True)) if ranges else (0.0, 0.0)
@@ -165,7 +174,7 @@ def _logs(data: Spline) -> list[Array]:
 
 def typical_cost(data: Peaks | Spline) -> float:
     """The geometric mean of the cost."""
-    if not isinstance(data, Spline):
+    if not is_spline(data):
         return 1.0
     return math.exp(math.fsum(float(logs.mean()) for logs in _logs(data)))
 

@@ -21,6 +21,7 @@ from .fitting import Gradient, fit_function, fit_grid, fit_smoothed
 from .georeference import Georeference
 from .layers import (
     Layer,
+    is_spline,
     make_layers,
     require_cost_range,
     require_ground,
@@ -306,7 +307,7 @@ class Surface:
         if self.native is not None:
             x, y = self.native.plane.centres()
             return Cells(float(x[0]), float(y[0]), *self.native.plane.sides)
-        if not isinstance(self.data, Spline):
+        if not is_spline(self.data):
             return None
         return Cells(self.data.x0, self.data.y0, self.data.dx, self.data.dy)
 
@@ -377,7 +378,7 @@ class Surface:
     @property
     def least_cost(self) -> float:
         """The cost is nowhere below this; 1 without cost layers."""
-        return self.data.floor if isinstance(self.data, Spline) else 1.0
+        return self.data.floor if is_spline(self.data) else 1.0
 
     @cached_property
     def typical_cost(self) -> float:

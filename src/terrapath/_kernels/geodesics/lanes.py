@@ -13,7 +13,17 @@ from ..compiler import inner_kernel, kernel
 from ..distance.surface_ray import surface_piece
 from ..space.free_space import segment_is_free
 from ..surface.speeds import speed_at
-from ..surface.surfaces import has_cells, stretch_at
+from ..surface.surfaces import (
+    has_cells,
+    mean_cell_cost,
+    slope_at,
+    spot_at,
+    squared_cost_at,
+    stretch_at,
+    value_at,
+)
+from ..travel.paces import pace_along, pace_jet
+from ..travel.priced import per_price
 
 # Gauss's rule of five points on [-1, 1]: the outer two pairs of nodes, and the weights.
 INNER, OUTER = 0.5384693101056831, 0.9061798459386640
@@ -81,14 +91,46 @@ def lane_length(surface, frame, ax, ay, bx, by):
     return total
 
 
+@inner_kernel
+def pair_of_chords(pace, size, z0, z1, z2):
+    """The chords of both halves of a piece, from the heights at its ends and its middle."""
+    return pace_along(pace, 0.5 * size, z1 - z0) + pace_along(pace, 0.5 * size, z2 - z1)
+
+
+@kernel
+def priced_piece(surface, ax, ay, bx, by):
+    vx, vy = bx - ax, by - ay
+    size, weight, pace = math.sqrt(vx * vx + vy * vy), surface.weights[0], surface.pace
+    if size == 0.0:
+        return 0.0
+    a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)
+    middle = spot_at(surface, ax + 0.5 * vx, ay + 0.5 * vy)
+    z0, slope, z2 = value_at(surface, 0, a), slope_at(surface, 0, middle), value_at(surface, 0, b)
+    chord = pace_along(pace, size, weight * (z2 - z0))
+    halves = pair_of_chords(pace, size, weight * z0, weight * slope.f, weight * z2)
+    jet, grade = pace_jet(pace, weight * (z2 - z0) / size), weight * (z2 - z0) / size
+    intercept = max(jet.value - grade * jet.slope, 0.0)
+    across = weight * (vx * slope.fy - vy * slope.fx) / size
+    stiff = intercept + jet.curvature * across * across
+    bent = (halves - chord) * (4.0 / 3.0) * (intercept / stiff if stiff > 0.0 else 0.0)
+    ends = math.sqrt(squared_cost_at(surface, a)) + math.sqrt(squared_cost_at(surface, b))
+    cost = (ends + 4.0 * math.sqrt(squared_cost_at(surface, middle))) / 6.0
+    if has_cells(surface):
+        cost *= mean_cell_cost(surface, ax, ay, bx, by)
+    return cost * (chord + max(bent, 0.0))
+
+
+@per_price(surface_piece, priced_piece)
+def piece(surface, ax, ay, bx, by):
+    """About what the best path between two places nearby costs."""
+
+
 @kernel
 def bent_length(surface, points):
     """About the length of a path (m, 2) whose pieces may bend between their ends."""
     total = 0.0
     for m in range(points.shape[0] - 1):
-        total += surface_piece(
-            surface, points[m, 0], points[m, 1], points[m + 1, 0], points[m + 1, 1]
-        )
+        total += piece(surface, points[m, 0], points[m, 1], points[m + 1, 0], points[m + 1, 1])
     return total
 
 

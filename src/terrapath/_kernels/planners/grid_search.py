@@ -140,11 +140,11 @@ def discover(surface, nodes, graph, node):
 
 
 @kernel
-def enter(graph, options, v):
+def enter(surface, graph, options, v):
     """Put a vertex into the heap, or move it up where its cost is now less."""
     key = graph.places[v, COST]
     if options.informed:
-        key += chord_between(graph, v, graph.vertices.shape[0] - 1)
+        key += chord_between(surface, graph, v, graph.vertices.shape[0] - 1)
     slot = graph.vertices[v].slot
     if slot == WITHOUT_PATH:
         graph.counters[OPEN] += 1
@@ -164,7 +164,7 @@ def measure(surface, space, graph, options, u, v, chord):
     if segment_is_free(space, origin[X], origin[Y], place[X], place[Y]):
         place[COST] = origin[COST] + length
         graph.vertices[v].parent = u
-        enter(graph, options, v)
+        enter(surface, graph, options, v)
 
 
 @inner_kernel
@@ -177,7 +177,7 @@ def relax(surface, space, nodes, graph, options, u, v):
         if graph.vertices[v].slot == UNSEEN:
             discover(surface, nodes, graph, v)
         graph.counters[CONSIDERED] += 1
-        chord = chord_between(graph, u, v)
+        chord = chord_between(surface, graph, u, v)
         if graph.places[u, COST] + chord < graph.places[v, COST]:
             measure(surface, space, graph, options, u, v, chord)
         else:

@@ -11,16 +11,20 @@ joins a new vertex to its parent's parent.
 import math
 
 from ..compiler import inner_kernel, kernel
-from ..space.free_space import segment_is_free
-from ..surface.lengths import chord_through
 from .buckets import lay_out, nearest, put, resize, squared_distance, within
+from .candidates import (
+    candidate_is_free,
+    candidate_length,
+    is_ruled_out,
+    measure_chord,
+    measure_chords,
+    onward_chord,
+)
 from .sampling import distance_to_goal, is_beside_path, near_radius, sample
 from .tree import (
-    CHECKED,
     CONSIDERED,
     COST,
     GOAL,
-    INTEGRATED,
     LAID_OUT,
     PRUNED,
     REWIRED,
@@ -29,67 +33,12 @@ from .tree import (
     X,
     Y,
     adopt,
-    careful_length,
     pass_on_cost,
     place,
     plant,
     release,
     renumber,
-    squared_rise,
 )
-
-# Measuring edges
-
-
-@inner_kernel
-def candidate_length(surface, tree, options, new, k):
-    """Length of the k-th candidate edge as the planner believes it, measured at most once."""
-    candidate = tree.near[k]
-    if candidate.length < 0.0:
-        candidate.length = candidate.chord
-        if options.riemannian:
-            tree.counters[INTEGRATED] += 1
-            refine_chord(surface, tree, options, new, k)
-            length = careful_length(surface, tree, options, new, candidate.vertex)
-            candidate.length = max(length, candidate.chord)
-    return candidate.length
-
-
-@inner_kernel
-def refine_chord(surface, tree, options, new, k):
-    """On rough ground replace the k-th candidate's chord by a sum of short ones, at most once."""
-    candidate = tree.near[k]
-    if options.tolerance > 0.0 and candidate.refined == 0:
-        p, q = tree.places[new], tree.places[candidate.vertex]
-        through = chord_through(surface, p[X], p[Y], q[X], q[Y], options.panel)
-        candidate.chord = max(through, candidate.chord)
-        candidate.refined = 1
-
-
-@inner_kernel
-def is_ruled_out(surface, tree, options, new, k, come, limit):
-    """Is a cost plus the chord of the k-th candidate edge no less than the limit?
-
-    Always False for a tree that is not pruned.
-    """
-    if not options.prune:
-        return False
-    if come + tree.near[k].chord >= limit:
-        return True
-    refine_chord(surface, tree, options, new, k)
-    return come + tree.near[k].chord >= limit
-
-
-@inner_kernel
-def candidate_is_free(space, tree, new, k):
-    """Does the k-th candidate edge stay in free space? Tested at most once."""
-    candidate = tree.near[k]
-    if candidate.free < 0:
-        tree.counters[CHECKED] += 1
-        p, q = tree.places[new], tree.places[candidate.vertex]
-        candidate.free = segment_is_free(space, p[X], p[Y], q[X], q[Y])
-    return candidate.free == 1
-
 
 # Growing the tree
 
@@ -142,37 +91,6 @@ def find_near(tree, options, radius, x, y):
     return x, y, count + 1, count
 
 
-@inner_kernel
-def measure_chord(tree, new, k):
-    """Store the k-th candidate's chord and cost; return their sum.
-
-    No path through it to the new vertex is shorter than this sum.
-    """
-    candidate = tree.near[k]
-    rise = squared_rise(tree, new, candidate.vertex)
-    candidate.chord = tree.floor * math.sqrt(candidate.squared + rise)
-    candidate.cost = tree.places[candidate.vertex, COST]
-    candidate.length = -1.0
-    candidate.free = -1
-    candidate.refined = 0
-    return candidate.cost + candidate.chord
-
-
-@kernel
-def measure_chords(tree, new, count):
-    """Store the candidates' chords and costs; return the most promising candidate.
-
-    That is the one whose cost plus chord is least.
-    """
-    promising = -1
-    least = math.inf
-    for k in range(count):
-        at_least = measure_chord(tree, new, k)
-        if at_least < least:
-            promising, least = k, at_least
-    return promising
-
-
 @kernel
 def choose_parent(surface, space, tree, options, new, count, promising):
     """Make the candidate through which the new vertex is cheapest to reach its parent.
@@ -190,10 +108,10 @@ def choose_parent(surface, space, tree, options, new, count, promising):
         if turn == promising:
             continue
         come = tree.near[k].cost
-        if is_ruled_out(surface, tree, options, new, k, come, least):
+        if is_ruled_out(surface, tree, options, new, k, False, come, least):
             pruned += 1
             continue
-        length = candidate_length(surface, tree, options, new, k)
+        length = candidate_length(surface, tree, options, new, k, False)
         if come + length < least and candidate_is_free(space, tree, new, k):
             best, least = k, come + length
     tree.counters[PRUNED] += pruned
@@ -211,13 +129,13 @@ def is_shorter(surface, space, tree, options, new, ancestor, spare):
     candidate.squared = squared_distance(tree.places, ancestor, p[X], p[Y])
     if candidate.squared > options.step * options.step:
         return False
-    measure_chord(tree, new, spare)
+    measure_chord(surface, tree, new, spare)
     least = p[COST]
     tree.counters[CONSIDERED] += 1
-    if is_ruled_out(surface, tree, options, new, spare, candidate.cost, least):
+    if is_ruled_out(surface, tree, options, new, spare, False, candidate.cost, least):
         tree.counters[PRUNED] += 1
         return False
-    length = candidate_length(surface, tree, options, new, spare)
+    length = candidate_length(surface, tree, options, new, spare, False)
     return candidate.cost + length < least and candidate_is_free(space, tree, new, spare)
 
 
@@ -249,10 +167,10 @@ def rewire(surface, space, tree, options, new, count):
         near = tree.near[k].vertex
         if near == parent:
             continue
-        if is_ruled_out(surface, tree, options, new, k, come, tree.near[k].cost):
+        if is_ruled_out(surface, tree, options, new, k, True, come, tree.near[k].cost):
             pruned += 1
             continue
-        length = candidate_length(surface, tree, options, new, k)
+        length = candidate_length(surface, tree, options, new, k, True)
         if come + length < tree.near[k].cost and candidate_is_free(space, tree, new, k):
             release(tree.links, near)
             adopt(tree, new, near, length)
@@ -301,14 +219,15 @@ def shortens_path(surface, space, tree, options, new, radius, spare):
         vertex = tree.links[vertex].parent
         if squared > radius * radius:
             continue
-        at_least = measure_chord(tree, new, spare)
-        if at_least >= most - gain and candidate.cost - candidate.chord <= most:
+        at_least = measure_chord(surface, tree, new, spare)
+        if at_least >= most - gain and candidate.cost - onward_chord(surface, tree, spare) <= most:
             continue
-        length = candidate_length(surface, tree, options, new, spare)
+        length = candidate_length(surface, tree, options, new, spare, False)
         if candidate_is_free(space, tree, new, spare):
             if candidate.cost + length < most - gain:
                 return True
-            most = max(most, candidate.cost - length)
+            on = candidate_length(surface, tree, options, new, spare, True)
+            most = max(most, candidate.cost - on)
     return False
 
 
@@ -328,7 +247,7 @@ def extend(surface, space, tree, options, x, y, is_beside):
     is_crowded = is_beside and count > CROWD * math.log(new)
     if is_crowded and not shortens_path(surface, space, tree, options, new, radius, count):
         return False
-    promising = measure_chords(tree, new, count)
+    promising = measure_chords(surface, tree, new, count)
     if promising < 0 or not candidate_is_free(space, tree, new, closest):
         return False
     tree.counters[CONSIDERED] += 2 * count - 1
@@ -365,8 +284,8 @@ def hang_branch(surface, space, tree, options):
         candidate, p = tree.near[0], tree.places[new]
         candidate.vertex = new - 1
         candidate.squared = squared_distance(tree.places, new - 1, p[X], p[Y])
-        measure_chord(tree, new, 0)
-        length = candidate_length(surface, tree, options, new, 0)
+        measure_chord(surface, tree, new, 0)
+        length = candidate_length(surface, tree, options, new, 0, False)
         if not (length < math.inf and candidate_is_free(space, tree, new, 0)):
             return
         adopt(tree, new - 1, new, length)

@@ -4,6 +4,8 @@ import math
 
 from ..compiler import inner_kernel, kernel
 from ..surface.surfaces import spot_at, value_at
+from ..travel.paces import pace_along
+from ..travel.priced import per_price
 from .buckets import squared_distance
 from .tree import COST, GOAL, LIFTED, VERTICES, X, Y
 
@@ -25,11 +27,11 @@ def area_to_search(tree, options):
     """The area of the bounds, or of the ellipse that holds all better paths if that is less.
 
     A path of length c stays where the planar distances to start and goal sum to at most c over
-    the least cost, because no chord is shorter than its planar distance.
+    the least that a step on the plane costs.
     """
     area = (options.x1 - options.x0) * (options.y1 - options.y0)
     if options.informed and tree.counters[GOAL] >= 0:
-        longest = tree.places[tree.counters[GOAL], COST] / tree.floor
+        longest = tree.places[tree.counters[GOAL], COST] / tree.least
         focal = distance_to_goal(tree, options, 0)
         area = min(area, 0.25 * math.pi * longest * math.sqrt(max(longest**2 - focal**2, 0.0)))
     return area
@@ -49,27 +51,48 @@ def is_within_bounds(options, x, y):
     return options.x0 <= x <= options.x1 and options.y0 <= y <= options.y1
 
 
+@inner_kernel
+def metric_chords(surface, tree, x, y, from_start, to_goal):
+    goal, spot = tree.counters[GOAL], spot_at(surface, x, y)
+    for layer in range(surface.weights.shape[0]):
+        z = surface.weights[layer] * value_at(surface, layer, spot)
+        from_start += (z - tree.places[0, LIFTED + layer]) ** 2
+        to_goal += (z - tree.places[goal, LIFTED + layer]) ** 2
+    return math.sqrt(from_start) + math.sqrt(to_goal)
+
+
+@inner_kernel
+def priced_chords(surface, tree, x, y, from_start, to_goal):
+    z = surface.weights[0] * value_at(surface, 0, spot_at(surface, x, y))
+    up, on = z - tree.places[0, LIFTED], tree.places[tree.counters[GOAL], LIFTED] - z
+    to_here = pace_along(surface.pace, math.sqrt(from_start), up)
+    return to_here + pace_along(surface.pace, math.sqrt(to_goal), on)
+
+
+@per_price(metric_chords, priced_chords)
+def chords_through(surface, tree, x, y, from_start, to_goal):
+    """The chords from the start to (x, y) and on to the goal, at cost 1.
+
+    from_start, to_goal : squared distances on the plane.
+    """
+
+
 @kernel
 def can_improve(surface, tree, x, y):
     """Can a path through (x, y) be shorter than the best one, by the chords to start and goal?"""
     goal = tree.counters[GOAL]
     from_start = squared_distance(tree.places, 0, x, y)
     to_goal = squared_distance(tree.places, goal, x, y)
-    longest = tree.places[goal, COST] / tree.floor
-    if math.sqrt(from_start) + math.sqrt(to_goal) >= longest:
+    if math.sqrt(from_start) + math.sqrt(to_goal) >= tree.places[goal, COST] / tree.least:
         return False
-    spot = spot_at(surface, x, y)
-    for layer in range(surface.weights.shape[0]):
-        z = surface.weights[layer] * value_at(surface, layer, spot)
-        from_start += (z - tree.places[0, LIFTED + layer]) ** 2
-        to_goal += (z - tree.places[goal, LIFTED + layer]) ** 2
-    return math.sqrt(from_start) + math.sqrt(to_goal) < longest
+    least = chords_through(surface, tree, x, y, from_start, to_goal)
+    return least < tree.places[goal, COST] / tree.floor
 
 
 @inner_kernel
 def point_of_ellipse(tree, options, u, v):
     """The point of the ellipse of better paths for (u, v) in the unit square, uniformly."""
-    longest = tree.places[tree.counters[GOAL], COST] / tree.floor
+    longest = tree.places[tree.counters[GOAL], COST] / tree.least
     ax, ay = tree.places[0, X], tree.places[0, Y]
     focal = distance_to_goal(tree, options, 0)
     width = math.sqrt(max(longest**2 - focal**2, 0.0))

@@ -8,7 +8,17 @@ import numpy as np
 from ..compiler import inner_kernel, kernel
 from ..dtypes import record
 from ..surface.lengths import composite_boole, length_in_cells, norm, segment_length
-from ..surface.surfaces import Metric, has_cells, plus_layer, slope_at, spot_at, times_cost
+from ..surface.surfaces import (
+    Metric,
+    has_cells,
+    plus_layer,
+    slope_at,
+    spot_at,
+    squared_cost_at,
+    times_cost,
+)
+from ..travel.paces import pace_along
+from ..travel.priced import per_price
 from .buckets import Buckets
 
 # Places in Tree.counters.
@@ -29,7 +39,8 @@ X, Y = 0, 1
 COST = 2  # length from the start
 LIFTED = 3  # the first of the weighted layer values
 
-# The metric tensor at a vertex: what measuring an edge reads of it.
+# The metric tensor at a vertex: what measuring an edge reads of it. Under a pace the three numbers
+# are the cost and the slopes along both axes.
 TENSOR = record(*((name, np.float64) for name in ("h11", "h12", "h22")))
 
 # A vertex's links to others. A new cost is passed on through many, so they are small records.
@@ -41,7 +52,7 @@ LINK = record(
     ("age", np.int32),  # how many vertices were in the tree before it
 )
 
-# A candidate edge between the newest vertex and one near it.
+# A candidate edge between the newest vertex and one near it, in one direction or in both.
 CANDIDATE = record(
     ("squared", np.float64),  # planar distance squared
     ("chord", np.float64),  # no path along the edge is shorter
@@ -65,8 +76,9 @@ class Tree(NamedTuple):
     counters: np.ndarray  # (COUNTERS,) int64, 0 before the tree is planted
     buckets: Buckets
     floor: float  # no cost of the surface is below it
+    least: float  # nor that of a step on the plane, as a share of its size
     branch: np.ndarray  # (m, 2) float64: the first branch, from start to goal; m = 0 for none
-    near: np.ndarray  # (n,) CANDIDATE: workspace
+    near: np.ndarray  # (n,) or (2 n,) CANDIDATE: workspace; under a pace two directions
     queue: np.ndarray  # (n,) int32: workspace
 
 
@@ -92,11 +104,27 @@ class Options(NamedTuple):
 
 
 @inner_kernel
-def chord_between(graph, a, b):
-    """Chord between two vertices of any graph with ``places``, times the least cost."""
+def chord_between(surface, graph, a, b):
+    """Chord from one vertex to another of any graph with ``places``, times the least cost."""
     p, q = graph.places[a], graph.places[b]
     dx, dy = p[X] - q[X], p[Y] - q[Y]
-    return graph.floor * math.sqrt(dx * dx + dy * dy + squared_rise(graph, a, b))
+    return chord_over(surface, graph, a, b, dx * dx + dy * dy)
+
+
+@inner_kernel
+def metric_chord_over(surface, graph, a, b, squared):
+    return graph.floor * math.sqrt(squared + squared_rise(graph, a, b))
+
+
+@inner_kernel
+def priced_chord_over(surface, graph, a, b, squared):
+    rise = graph.places[b, LIFTED] - graph.places[a, LIFTED]
+    return graph.floor * pace_along(surface.pace, math.sqrt(squared), rise)
+
+
+@per_price(metric_chord_over, priced_chord_over)
+def chord_over(surface, graph, a, b, squared):
+    """Chord from one vertex to another whose squared planar distance is known."""
 
 
 @inner_kernel
@@ -110,8 +138,7 @@ def squared_rise(graph, a, b):
 
 
 @inner_kernel
-def survey(surface, graph, new, x, y):
-    """Write a vertex's position, weighted layers and metric, in any graph with ``places``."""
+def metric_survey(surface, graph, new, x, y):
     place, vertex = graph.places[new], graph.vertices[new]
     place[X], place[Y] = x, y
     spot, h = spot_at(surface, x, y), Metric(1.0, 0.0, 1.0)
@@ -125,22 +152,54 @@ def survey(surface, graph, new, x, y):
     vertex.h22 = h.h22
 
 
+@inner_kernel
+def priced_survey(surface, graph, new, x, y):
+    place, vertex = graph.places[new], graph.vertices[new]
+    spot = spot_at(surface, x, y)
+    slope, weight = slope_at(surface, 0, spot), surface.weights[0]
+    place[X], place[Y], place[LIFTED] = x, y, weight * slope.f
+    vertex.h11 = math.sqrt(squared_cost_at(surface, spot))
+    vertex.h12, vertex.h22 = weight * slope.fx, weight * slope.fy
+
+
+@per_price(metric_survey, priced_survey)
+def survey(surface, graph, new, x, y):
+    """Write a vertex's position, weighted layers and metric, in any graph with ``places``."""
+
+
+@inner_kernel
+def surveyed_norm(surface, vertex, dx, dy):
+    return norm(vertex, dx, dy)
+
+
+@inner_kernel
+def surveyed_cost(surface, vertex, dx, dy):
+    rise = vertex.h12 * dx + vertex.h22 * dy
+    return vertex.h11 * pace_along(surface.pace, math.sqrt(dx * dx + dy * dy), rise)
+
+
+@per_price(surveyed_norm, surveyed_cost)
+def surveyed_speed(surface, vertex, dx, dy):
+    """What (dx, dy) costs at a vertex."""
+
+
 @kernel
 def edge_length(surface, graph, a, b, panel):
-    """Length of the edge between two vertices by Line-R, in panels, or cell by cell."""
+    """Length of the edge from one vertex to another by Line-R, in panels, or cell by cell."""
     p, q = graph.places[a], graph.places[b]
     if has_cells(surface):
         return length_in_cells(surface, p[X], p[Y], q[X], q[Y])
     dx, dy = q[X] - p[X], q[Y] - p[Y]
     panels = max(math.ceil(math.sqrt(dx * dx + dy * dy) / panel), 1)
     dx, dy = dx / panels, dy / panels
-    ends = norm(graph.vertices[a], dx, dy) + norm(graph.vertices[b], dx, dy)
+    ends = surveyed_speed(surface, graph.vertices[a], dx, dy)
+    ends += surveyed_speed(surface, graph.vertices[b], dx, dy)
     return composite_boole(surface, p[X], p[Y], dx, dy, ends, panels)
 
 
 @kernel
 def careful_length(surface, graph, options, a, b):
-    """Length of the edge between two vertices: by Line-R, or on rough ground adaptively.
+    """Length of the edge from one vertex to another: by Line-R, or on rough ground adaptively.
 
     There the nodes of Line-R would miss much; pieces are halved until two rules agree.
     """

@@ -5,9 +5,20 @@ import math
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
+from ..travel.paces import hidden_bend, pace_along
+from ..travel.priced import per_price
 from ..vec4 import four, four_in_row, sqrt, total
 from .speeds import speed_at, speeds_along, speeds_inside
-from .surfaces import Metric, floor_of, has_cells, spot_at, stretch_at, value_at
+from .surfaces import (
+    Metric,
+    floor_of,
+    has_cells,
+    slope_along,
+    spot_at,
+    squared_cost_at,
+    stretch_at,
+    value_at,
+)
 
 # Where Gauss' rule has its first node.
 _NEAR = 0.5 - 0.5 * math.sqrt(0.6)
@@ -79,17 +90,30 @@ def line_r(surface, ax, ay, bx, by):
 
 
 @kernel
-def chord(surface, ax, ay, bx, by):
-    """Euclidean distance in R^n between the lifted points, times the least cost.
-
-    Never above the geodesic distance.
-    """
+def metric_chord(surface, ax, ay, bx, by):
     total = (bx - ax) * (bx - ax) + (by - ay) * (by - ay)
     a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)
     for layer in range(surface.weights.shape[0]):
         rise = value_at(surface, layer, b) - value_at(surface, layer, a)
         total += (surface.weights[layer] * rise) ** 2
     return floor_of(surface) * math.sqrt(total)
+
+
+@kernel
+def priced_chord(surface, ax, ay, bx, by):
+    a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)
+    rise = surface.weights[0] * (value_at(surface, 0, b) - value_at(surface, 0, a))
+    size = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+    return floor_of(surface) * pace_along(surface.pace, size, rise)
+
+
+@per_price(metric_chord, priced_chord)
+def chord(surface, ax, ay, bx, by):
+    """What no path from a to b costs less than.
+
+    Euclidean distance in R^n between the lifted points, or the straight line of constant grade,
+    times the least cost.
+    """
 
 
 @kernel
@@ -132,6 +156,28 @@ _FIFTEEN = [
 _RULES = np.array([_NODES, _THREE, _SEVEN, _FIFTEEN]).reshape(4, 2, 4)
 
 
+@inner_kernel
+def nothing_hidden(surface, x, y, vx, vy):
+    return 0.0
+
+
+@inner_kernel
+def hidden_kink(surface, x, y, vx, vy):
+    size = math.sqrt(vx * vx + vy * vy)
+    if size == 0.0:
+        return 0.0
+    a, b = spot_at(surface, x - vx, y - vy), spot_at(surface, x + vx, y + vy)
+    first = surface.weights[0] * slope_along(surface, 0, a, vx, vy) / size
+    last = surface.weights[0] * slope_along(surface, 0, b, vx, vy) / size
+    cost = sqrt(max(squared_cost_at(surface, a), squared_cost_at(surface, b)))
+    return cost * size * hidden_bend(surface.pace, first, last)
+
+
+@per_price(nothing_hidden, hidden_kink)
+def hidden(surface, x, y, vx, vy):
+    """What a kink of the pace between the grades at the ends may hide from all rules."""
+
+
 @kernel
 def integral(surface, x, y, vx, vy, tolerance):
     """The integral of |v|_h from (x, y) - v to (x, y) + v and an estimate of its error.
@@ -140,16 +186,17 @@ def integral(surface, x, y, vx, vy, tolerance):
     that. Seven points are enough where their relative error estimate is within the tolerance.
     """
     three, seven, fifteen = 0.0, 0.0, 0.0
+    doubt = hidden(surface, x, y, vx, vy)
     for k in range(2):
         if k == 1 and abs(seven - three) <= tolerance * seven:
-            return seven, 0.0
+            return seven, doubt
         nodes = four_in_row(_RULES, 0, k, 0)
         below = speeds_along(surface, x, y, vx, vy, nodes)
         speeds = below + speeds_along(surface, x, y, vx, vy, -1.0 * nodes)
         three += total(four_in_row(_RULES, 1, k, 0) * speeds)
         seven += total(four_in_row(_RULES, 2, k, 0) * speeds)
         fifteen += total(four_in_row(_RULES, 3, k, 0) * speeds)
-    return fifteen, abs(fifteen - seven)
+    return fifteen, max(abs(fifteen - seven), doubt)
 
 
 # Pieces are not halved beyond this number: they are far smaller than any feature of a surface.

@@ -1,23 +1,40 @@
 """How fast lengths grow along a vector, at one point and at several points of a segment."""
 
+import math
+
 from ..compiler import inner_kernel
 from ..dispatch import per_class
+from ..travel.paces import pace_along
+from ..travel.priced import PricedPeaks, per_price
 from ..vec4 import four, fused, sqrt
 from .surfaces import Peaks, Spline, slope_along, spot_at, squared_cost_at
 
 
 @inner_kernel
-def speed_at(surface, x, y, vx, vy):
-    """|v|_h for v = (vx, vy): c (|v|^2 + sum_k (w_k dx_k(v))^2)^1/2; c is the smooth cost.
-
-    On ``Peaks`` also at four points at once.
-    """
+def metric_speed(surface, x, y, vx, vy):
     spot = spot_at(surface, x, y)
     squared = 0.0 * x + (vx * vx + vy * vy)  # a number or four
     for layer in range(surface.weights.shape[0]):
         rise = surface.weights[layer] * slope_along(surface, layer, spot, vx, vy)
         squared = squared + rise * rise
     return sqrt(squared_cost_at(surface, spot) * squared)
+
+
+@inner_kernel
+def priced_speed(surface, x, y, vx, vy):
+    spot = spot_at(surface, x, y)
+    rise = surface.weights[0] * slope_along(surface, 0, spot, vx, vy)
+    cost = pace_along(surface.pace, math.sqrt(vx * vx + vy * vy), rise)
+    return sqrt(squared_cost_at(surface, spot)) * cost
+
+
+@per_price(metric_speed, priced_speed)
+def speed_at(surface, x, y, vx, vy):
+    """What v = (vx, vy) costs, without costs in cells; c is the smooth cost.
+
+    |v|_h = c (|v|^2 + sum_k (w_k dx_k(v))^2)^1/2, on ``Peaks`` also at four points at once. Under a
+    pace F(x, v) = c |v| P(grad z . v / |v|).
+    """
 
 
 @inner_kernel
@@ -35,9 +52,15 @@ def spline_speeds_along(surface, x, y, vx, vy, shares):
     )
 
 
-@per_class({Peaks: peaks_speeds_along, Spline: spline_speeds_along})
+@per_class(
+    {
+        Peaks: peaks_speeds_along,
+        Spline: spline_speeds_along,
+        PricedPeaks: spline_speeds_along,
+    }
+)
 def speeds_along(surface, x, y, vx, vy, shares):
-    """|v|_h at four points of the segment from (x, y) to (x, y) + v, given as shares of it."""
+    """The speed at four points of the segment from (x, y) to (x, y) + v, given as shares of it."""
 
 
 @inner_kernel
@@ -55,9 +78,15 @@ def spline_speeds_inside(surface, x, y, vx, vy):
     )
 
 
-@per_class({Peaks: peaks_speeds_inside, Spline: spline_speeds_inside})
+@per_class(
+    {
+        Peaks: peaks_speeds_inside,
+        Spline: spline_speeds_inside,
+        PricedPeaks: spline_speeds_inside,
+    }
+)
 def speeds_inside(surface, x, y, vx, vy):
-    """|v|_h at a quarter, a half and three quarters of the segment from (x, y) to (x, y) + v.
+    """The speed at a quarter, a half and three quarters of the segment from (x, y) to (x, y) + v.
 
     Four numbers are returned; ignore the last one.
     """

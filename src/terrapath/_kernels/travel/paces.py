@@ -89,6 +89,17 @@ def pace_at(pace, grade):
 
 
 @inner_kernel
+def pace_along(pace, size, rise):
+    """size P(rise / size): the cost of so many horizontal metres that rise so much in all."""
+    knots, tails = pace.knots, pace.tails
+    if rise < knots[0] * size:
+        return tails[0, 1] * size + tails[0, 0] * rise
+    if rise >= knots[-1] * size:  # also where the size is 0
+        return tails[1, 1] * size + tails[1, 0] * rise
+    return size * pace_at(pace, rise / size)
+
+
+@inner_kernel
 def intercept_at(pace, slope):
     """A(B) = min over m of P(m) - B m for a slope B; minus infinity where there is no minimum.
 
@@ -104,6 +115,21 @@ def intercept_at(pace, slope):
         else:
             high = middle
     return min(pace_at(pace, low) - slope * low, pace_at(pace, high) - slope * high)
+
+
+@inner_kernel
+def hidden_bend(pace, a, b):
+    """A bound on how far P is from straight between two grades; 0 where it has no joint there.
+
+    Joints are kinks and the critical grades. Where P is smooth, rules see how it bends.
+    """
+    low, high = min(a, b), max(a, b)
+    has_joint = low < pace.knots[0] < high or low < pace.knots[-1] < high
+    for k in range(len(pace.kinks)):
+        has_joint = has_joint or low < pace.kinks[k] < high
+    if not has_joint:
+        return 0.0
+    return 0.25 * (high - low) * (pace_jet(pace, high).slope - pace_jet(pace, low).slope)
 
 
 @kernel

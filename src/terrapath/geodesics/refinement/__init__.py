@@ -83,8 +83,8 @@ def refine(
         require_positive(time_limit=time_limit)
         must_stop = stop_after(time_limit, must_stop)
     given = problem.path(_checked(problem, path))
-    is_hard = given.length > 0.0 and not must_stop() and _is_hard(problem)
-    if problem.surface.cost_cells is not None:
+    is_hard = given.gauged > 0.0 and not must_stop() and _is_hard(problem)
+    if problem.surface.cost_cells is not None and problem.travel is None:
         from ..cell_routes import polished
 
         shorter = _shortened(problem, given, must_stop, rival) if is_hard else given
@@ -92,7 +92,7 @@ def refine(
     if is_hard:
         return _refined_on_rough_ground(problem, given, tolerance, must_stop, rival)
     best, is_pulled = _pulled(problem, given, tolerance, must_stop)
-    if not (is_pulled or given.length == 0.0 or must_stop()):
+    if not (is_pulled or given.gauged == 0.0 or must_stop()):
         tell(UnfinishedWarning(NO_ROOM))
     return best
 
@@ -100,7 +100,7 @@ def refine(
 def _is_hard(problem: Problem) -> bool:
     """Is the ground rough, or are features much longer along one axis than along the other?"""
     x, y = feature_size(problem.surface)
-    return max(x, y) > LONG * min(x, y) or is_rough(problem.surface, problem.bounds)
+    return max(x, y) > LONG * min(x, y) or is_rough(problem.priced, problem.bounds)
 
 
 def _pulled(
@@ -116,8 +116,8 @@ def _pulled(
             continue
         found, is_pulled = problem.path(points), True
         # Of two that are equally long, the later one has fewer points.
-        longest = min(best.length * (1.0 + tolerance), given.length * (1.0 + ROUNDING))
-        if found.length <= longest:
+        longest = min(best.gauged * (1.0 + tolerance), given.gauged * (1.0 + ROUNDING))
+        if found.gauged <= longest:
             best = found
         if must_stop():
             break
@@ -125,15 +125,15 @@ def _pulled(
 
 
 def _shortened(problem: Problem, given: Path, must_stop: MustStop, rival: float) -> Path:
-    """The path shortened by true lengths; the same path from the goal to the start."""
+    """The path shortened by true lengths; without a pace the same from the goal to the start."""
     from .lanes import shortened
 
-    order = -1 if problem.goal < problem.start else 1
+    order = -1 if problem.goal < problem.start and problem.travel is None else 1
     made = shortened(problem, given.points[::order].copy(), must_stop, rival=rival)
     if not (made.is_settled or made.is_hopeless or must_stop()):
         tell(UnfinishedWarning(made.remark))
     found = problem.path(made.points[::order].copy())
-    return min(given, found, key=lambda path: path.length)
+    return min(given, found, key=lambda path: path.gauged)
 
 
 def _refined_on_rough_ground(
@@ -141,8 +141,8 @@ def _refined_on_rough_ground(
 ) -> Path:
     """The path shortened by true lengths, then pulled taut where the ground is smooth enough."""
     best = _shortened(problem, given, must_stop, rival)
-    is_worth_it = best.length * (1.0 - LITTLE) <= rival
-    if is_worth_it and _is_resolved(problem.surface, best):
+    is_worth_it = best.gauged * (1.0 - LITTLE) <= rival
+    if is_worth_it and _is_resolved(problem.priced, best):
         return _pulled(problem, best, tolerance, must_stop, is_near=True)[0]
     return best
 
@@ -153,7 +153,7 @@ def _is_resolved(surface: Surface, path: Path) -> bool:
     if pieces == MOST_PIECES:
         return False
     energy = lift(surface, along(path.points, pieces)).energy
-    return math.sqrt(energy) <= SMOOTH * path.length
+    return math.sqrt(energy) <= SMOOTH * path.gauged
 
 
 def _checked(problem: Problem, path: Path | npt.ArrayLike) -> Array:
@@ -209,7 +209,7 @@ def _refined(
 ) -> Iterator[Array]:
     """Polylines (m, 2) that may be shorter; the last is most likely the shortest."""
     space = problem.free_space
-    if given.length == 0.0 or must_stop():
+    if given.gauged == 0.0 or must_stop():
         return
     if not (space.geometries or space.circles or space.masks):
         candidates = _geodesics(problem.surface, given, tolerance, must_stop, is_near)

@@ -151,7 +151,7 @@ class _Ground:
 
     @classmethod
     def of(cls, problem: Problem, points: Array) -> _Ground:
-        size = np.array(feature_size(problem.surface))
+        size = np.array(feature_size(problem.priced))
         frame = kernels.Frame(*problem.bounds, *(LONGEST * size).tolist())
         bends, corners = corners_near(problem.free_space, points, BESIDE * float(size.max()))
         tree = shapely.STRtree(shapely.points(bends / size))
@@ -173,7 +173,7 @@ class _Ground:
         even = along(scaled, max(math.ceil(sizes.sum() / spacing), 2)) * self.size
         even[[0, -1]] = points[[0, -1]]
         given = self.problem.path(points)
-        if self.problem.allows(even) and self.problem.path(even).length <= given.length:
+        if self.problem.allows(even) and self.problem.path(even).gauged <= given.gauged:
             return even
         counts = np.maximum(np.ceil(sizes / spacing - 1e-9), 1).astype(np.int64)
         first = np.repeat(np.cumsum(counts) - counts, counts)
@@ -183,13 +183,13 @@ class _Ground:
 
     def fill(self, lanes: kernels.Lanes, changed: Flags) -> None:
         """Measure the pieces between places beside the points that have changed."""
-        surface, space = self.problem.surface.data, self.problem.free_space.data
+        surface, space = self.problem.priced.data, self.problem.free_space.data
         kernels.fill_table(surface, space, self.frame, lanes, changed)
 
     def gain_by_bending(self, points: Array) -> float:
         """By what share a path would be shorter if its pieces bent between their ends."""
-        length = self.problem.path(points).length
-        return 1.0 - float(kernels.bent_length(self.problem.surface.data, points)) / length
+        length = self.problem.path(points).gauged
+        return 1.0 - float(kernels.bent_length(self.problem.priced.data, points)) / length
 
     def bends_beside(self, points: Array, distance: float) -> Array:
         """The nearest bend (m, 2) to each point within a distance in features; else NaN."""

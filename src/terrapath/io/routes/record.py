@@ -101,11 +101,26 @@ def _measures(solution: Solution) -> dict[str, Any]:
         "length": solution.length,
         **_ground(path),
         "unrefined_length": None if solution.unrefined is None else solution.unrefined.length,
+        **_travel(solution),
         "cost": solution.cost,
         "lower_bound": solution.lower_bound,
         "gap": solution.gap,
         "straight_length": solution.straight_length,
         "contributions": None if path is None else path.contributions,
+    }
+
+
+def _travel(solution: Solution) -> dict[str, Any]:
+    """The travel model, and what it makes of the route."""
+    travel, unrefined, path = solution.problem.travel, solution.unrefined, solution.path
+    if travel is None:
+        return {}
+    return {
+        "travel": {"model": travel.name, "options": travel.options, "source": travel.source},
+        "relaxed_value": solution.relaxed_value,
+        "unrefined_value": None if unrefined is None else unrefined.value,
+        "in_switchbacks": None if path is None else path.in_switchbacks,
+        "straight_value": solution.straight_value,
     }
 
 
@@ -146,7 +161,10 @@ def route_record(solution: Solution) -> dict[str, Any]:
     with a georeference ``crs`` names that plane, and ``start_lonlat``, ``goal_lonlat`` and
     ``path_lonlat`` are longitude and latitude in degrees. Where the path was refined,
     ``unrefined_length`` is the length of the planner's own path. ``contributions`` are the shares
-    of the length that come from the plane and from each layer. ``legs`` are those of a tour.
+    of the length that come from the plane and from each layer. ``legs`` are those of a tour. With a
+    travel model, ``travel`` names it, ``value`` is what it makes of the route, ``in_switchbacks``
+    is the share of the route, on the map, that is steeper than its critical grades, and ``length``
+    is still the length under h.
     """
     problem, path = solution.problem, solution.path
     record: dict[str, Any] = {
@@ -158,7 +176,7 @@ def route_record(solution: Solution) -> dict[str, Any]:
         "path": None if path is None else path.points,
         "stopped_by": solution.stopped_by,
         "counters": solution.counters,
-        "alternatives": [other.length for other in solution.alternatives],
+        "alternatives": [other.value for other in solution.alternatives],
         **provenance(solution),
         **_ends_in_degrees(solution),
     }

@@ -16,6 +16,12 @@ from ...surface.georeference import amount
 from ...validation import Array, require_not_negative
 
 
+def of_model(solution: Solution) -> str:
+    """Which travel model the value is of, in words; empty without one."""
+    travel = solution.problem.travel
+    return "" if travel is None else f" by {travel!r}"
+
+
 @dataclass(frozen=True, eq=False)
 class Route:
     """A solution's path, and which samples of its profile are written.
@@ -78,7 +84,7 @@ class Route:
             f"descent {amount(path.descent, path.ground_unit)}, "
             f"steepest grade {100.0 * path.steepest:.3g} %, "
             f"steepest side slope {100.0 * path.steepest_side:.3g} %; "
-            f"minimised: {amount(path.length, solution.unit)}"
+            f"minimised: {amount(path.value, solution.unit)}{of_model(solution)}"
         )
         if solution.lower_bound is not None:
             bound = amount(solution.lower_bound, solution.unit)
