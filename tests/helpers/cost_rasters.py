@@ -1,13 +1,27 @@
-"""Random cost rasters, and a walker through their cells that shares no code with the package."""
+"""Surfaces of cost rasters, random ones, and a walker through their cells.
+
+The walker shares no code with the package.
+"""
 
 import itertools
 import math
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import gaussian_filter
 
+import terrapath as tp
+from judges import Ground, value_of
+
 CELL = 10.0
+
+
+def cell_surface(costs, heights=None, x=None, y=None, **options):
+    """Ground (ny, nx), flat without heights, under one cost raster; centres at 0, 10, 20, ..."""
+    ny, nx = costs.shape
+    x, y = CELL * np.arange(nx) if x is None else x, CELL * np.arange(ny) if y is None else y
+    ground = np.zeros_like(costs) if heights is None else heights
+    given = {"names": ["height", "going"], "kinds": ["rise", "cells"], **options}
+    return tp.Surface.from_grid([ground, costs], x, y, **given)
 
 
 def random_costs(random, count):
@@ -52,8 +66,7 @@ class Walker:
     def __init__(self, costs, heights, x, y):
         self.costs, self.x, self.y = costs, x, y
         self.cell = x[1] - x[0], y[1] - y[0]
-        flat = not np.ptp(heights)
-        self.spline = None if flat else RectBivariateSpline(y, x, heights, s=0)
+        self.land = Ground(x, y, heights) if np.ptp(heights) else None
 
     def cost_at(self, px, py, along_side):
         """The cost of a stretch with its middle at p; on a side that it runs along, the lower."""
@@ -67,25 +80,10 @@ class Walker:
         return min(found)
 
     def ground(self, a, b):
-        """The length on the ground of a straight stretch, by 12 points of Gauss."""
-        run = math.dist(a, b)
-        if self.spline is None or run == 0.0:
-            return run
-        nodes, weights = np.polynomial.legendre.leggauss(12)
-        # The spline's pieces meet at the centres of cells.
-        cuts = {0.0, 1.0}
-        for axis, places in enumerate((self.x, self.y)):
-            if a[axis] != b[axis]:
-                shares = (places - a[axis]) / (b[axis] - a[axis])
-                cuts |= set(shares[(shares > 0.0) & (shares < 1.0)].tolist())
-        total, cuts = 0.0, sorted(cuts)
-        for low, high in itertools.pairwise(cuts):
-            t = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-            px, py = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
-            fx, fy = self.spline.ev(py, px, dy=1), self.spline.ev(py, px, dx=1)
-            grade = (fx * (b[0] - a[0]) + fy * (b[1] - a[1])) / run
-            total += 0.5 * (high - low) * run * float(weights @ np.sqrt(1.0 + grade**2))
-        return total
+        """The length on the ground of a straight stretch."""
+        if self.land is None:
+            return math.dist(a, b)
+        return value_of(self.land, np.array([a, b]))
 
     def length(self, points):
         """The weighted length of a polyline."""

@@ -5,24 +5,21 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
+from rough_maps import fractal
+
 FILLS = (-9999.0, -32768.0, 32767.0, -99999.0, -999.0, 65535.0, 1e20, -3.4028234663852886e38)
 PLAINS = (-1500.0, -5000.0, -12345.0)  # no program's own value, far below the ground
 SHAPES = ("blob", "edge", "wedge", "cells", "most")
 
 
-def fractal(random, side, roughness=2.2):
+def _rough(random, side, roughness=2.2):
     """(side, side), standard deviation 1."""
-    spectrum = np.fft.rfft2(random.normal(size=(side, side)))
-    fx, fy = np.fft.rfftfreq(side), np.fft.fftfreq(side)
-    size = np.hypot(fx, fy[:, None])
-    size[0, 0] = 1.0
-    made = np.fft.irfft2(spectrum * size**-roughness, (side, side))
-    return (made - made.mean()) / made.std()
+    return fractal(random, side, side, roughness)
 
 
 def _lake(random, side, level, relief):
     """Ground with a plain of water, and slopes down to its shore."""
-    ground = level + relief * (fractal(random, side) + 0.7)
+    ground = level + relief * (_rough(random, side) + 0.7)
     return np.maximum(ground, level)
 
 
@@ -30,17 +27,17 @@ def _steep_lake(random, side, level):
     """A flat sea between escarpments, as the Dead Sea: 30 degrees on cells of 30 m."""
     x = np.abs(np.arange(side) - side / 2.0) * 30.0
     slope = np.maximum(0.0, x - 0.2 * side * 30.0) * 0.6
-    return np.maximum(level + slope[None, :] + 40.0 * fractal(random, side), level)
+    return np.maximum(level + slope[None, :] + 40.0 * _rough(random, side), level)
 
 
 def _pit(random, side, depth):
-    ground = 100.0 + 20.0 * fractal(random, side)
+    ground = 100.0 + 20.0 * _rough(random, side)
     ground[side // 3 : side // 2, side // 3 : side // 2] = ground.min() - depth
     return ground
 
 
 def _city(random, side):
-    ground = 50.0 + 2.0 * fractal(random, side)
+    ground = 50.0 + 2.0 * _rough(random, side)
     for _ in range(8):
         j, i = random.integers(0, side - 12, 2)
         ground[j : j + 8, i : i + 10] = 60.0 + random.choice([20.0, 80.0, 250.0])
@@ -48,28 +45,28 @@ def _city(random, side):
 
 
 def _steps(random, side):
-    return 25.0 * np.floor(fractal(random, side) * 4.0)
+    return 25.0 * np.floor(_rough(random, side) * 4.0)
 
 
 GROUNDS = {
-    "hills": lambda r, n: 300.0 + 80.0 * fractal(r, n),
-    "mountains": lambda r, n: np.round(2000.0 + 500.0 * fractal(r, n, 1.7)),
+    "hills": lambda r, n: 300.0 + 80.0 * _rough(r, n),
+    "mountains": lambda r, n: np.round(2000.0 + 500.0 * _rough(r, n, 1.7)),
     "rough": lambda r, n: 100.0 + 10.0 * r.normal(size=(n, n)),
     "lake": lambda r, n: _lake(r, n, 395.5, 60.0),
     "sea and mountains": lambda r, n: np.round(_lake(r, n, 0.0, 900.0)),
     "dead sea": lambda r, n: _steep_lake(r, n, -430.5),
-    "bathymetry": lambda r, n: np.round(-9998.7 + 300.0 * fractal(r, n)),
-    "trench": lambda r, n: -9998.7 + 0.5 * fractal(r, n),
-    "steep bathymetry": lambda r, n: np.round(-8000.0 + 1200.0 * fractal(r, n, 1.7)),
-    "moon": lambda r, n: np.round(9900.0 + 120.0 * fractal(r, n)),
-    "crater": lambda r, n: -9000.0 - 60.0 * np.abs(fractal(r, n)),
+    "bathymetry": lambda r, n: np.round(-9998.7 + 300.0 * _rough(r, n)),
+    "trench": lambda r, n: -9998.7 + 0.5 * _rough(r, n),
+    "steep bathymetry": lambda r, n: np.round(-8000.0 + 1200.0 * _rough(r, n, 1.7)),
+    "moon": lambda r, n: np.round(9900.0 + 120.0 * _rough(r, n)),
+    "crater": lambda r, n: -9000.0 - 60.0 * np.abs(_rough(r, n)),
     "pit": lambda r, n: _pit(r, n, 100.0),
     "city": _city,
     "steps": _steps,
     "flat": lambda r, n: np.zeros((n, n)),
     "a flat pit": lambda r, n: np.pad(np.full((n // 4, n // 4), -10.0), ((9, n - n // 4 - 9),) * 2),
-    "a plateau of 9999": lambda r, n: np.round(np.minimum(9999.0, 9950.0 + 60 * fractal(r, n))),
-    "a floor at -999": lambda r, n: np.maximum(-999.0, -960.0 + 60 * fractal(r, n)),
+    "a plateau of 9999": lambda r, n: np.round(np.minimum(9999.0, 9950.0 + 60 * _rough(r, n))),
+    "a floor at -999": lambda r, n: np.maximum(-999.0, -960.0 + 60 * _rough(r, n)),
 }  # fmt: skip
 
 

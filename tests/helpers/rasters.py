@@ -38,3 +38,18 @@ def centres(transform=NORTH_UP, shape=(12, 10)):
     columns, rows = np.meshgrid(np.arange(shape[1]) + 0.5, np.arange(shape[0]) + 0.5)
     t = transform
     return np.stack([t.a * columns + t.b * rows + t.c, t.d * columns + t.e * rows + t.f], axis=-1)
+
+
+def centres_on_plane(surface, transform, shape):
+    """(rows, columns, 2): the centres of a raster's cells on the plane of its surface."""
+    return surface.georeference.from_map(centres(transform, shape))
+
+
+def blocked_at(mask, points):
+    """Which points of the plane lie in blocked cells of a mask."""
+    i, j = (
+        np.rint((points[..., k] - axis[0]) / (axis[1] - axis[0])).astype(int)
+        for k, axis in enumerate((mask.x, mask.y))
+    )
+    inside = (i >= 0) & (j >= 0) & (i < len(mask.x)) & (j < len(mask.y))
+    return inside & mask.blocked[np.where(inside, j, 0), np.where(inside, i, 0)]

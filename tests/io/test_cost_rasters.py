@@ -1,30 +1,26 @@
 """Cost rasters as files: their cells, other grids, no-data and the smooth option."""
 
+import json
+
 import numpy as np
 import pytest
-import rasterio
 from rasterio.transform import from_origin
 
+import rasters
 import terrapath as tp
-from terrapath import scenario
+from terrapath.cli.main import run
 
 
-def write(path, values, cell=10.0, crs="EPSG:32632", corner=(500_000.0, 5_200_000.0), nodata=None):
-    """A north-up GeoTIFF with its lower left corner at ``corner``."""
-    rows, columns = values.shape
-    transform = from_origin(corner[0], corner[1] + rows * cell, cell, cell)
-    profile = {"driver": "GTiff", "height": rows, "width": columns, "count": 1}
-    with rasterio.open(
-        path, "w", **profile, dtype="float64", crs=crs, transform=transform, nodata=nodata
-    ) as file:
-        file.write(values[::-1].astype(np.float64), 1)
-    return str(path)
+def written(path, values, cell=10.0, crs="EPSG:32632", corner=(500_000.0, 5_200_000.0), **more):
+    """A GeoTIFF of rows from south to north, with its lower left corner at ``corner``."""
+    transform = from_origin(corner[0], corner[1] + len(values) * cell, cell, cell)
+    return str(rasters.write(path, values[::-1], transform, crs, **more))
 
 
 @pytest.fixture
 def dem(tmp_path):
     x, y = np.meshgrid(np.arange(30.0), np.arange(30.0))
-    return write(tmp_path / "dem.tif", np.sin(0.2 * x) + 0.1 * y)
+    return written(tmp_path / "dem.tif", np.sin(0.2 * x) + 0.1 * y)
 
 
 def places(count, cell, offset=0.0):
@@ -40,7 +36,7 @@ def places(count, cell, offset=0.0):
 @pytest.mark.parametrize(("count", "cell"), [(30, 10.0), (150, 2.0), (12, 25.0), (43, 7.0)])
 def test_a_cost_is_what_the_raster_says_in_its_own_cells(dem, tmp_path, count, cell):
     costs = 10.0 ** np.random.default_rng(1).uniform(-1.0, 2.0, (count, count))
-    surface = tp.read_surface(dem, costs={"mud": write(tmp_path / "mud.tif", costs, cell)})
+    surface = tp.read_surface(dem, costs={"mud": written(tmp_path / "mud.tif", costs, cell)})
     points, i, j = places(count, cell)
     np.testing.assert_array_equal(surface.cost(points), costs[j, i])
     np.testing.assert_array_equal(surface.cost_values(points)[:, 0], costs[j, i])
@@ -52,8 +48,8 @@ def test_rasters_with_different_cells_take_the_nearest(dem, tmp_path):
     surface = tp.read_surface(
         dem,
         costs={
-            "fine": write(tmp_path / "fine.tif", fine, 2.0),
-            "wide": write(tmp_path / "wide.tif", wide, 25.0),
+            "fine": written(tmp_path / "fine.tif", fine, 2.0),
+            "wide": written(tmp_path / "wide.tif", wide, 25.0),
         },
     )
     assert surface.cost_cells.values.shape == (2, 30, 30)
@@ -64,7 +60,7 @@ def test_rasters_with_different_cells_take_the_nearest(dem, tmp_path):
 def test_costs_can_be_smooth(dem, tmp_path):
     costs = np.ones((30, 30))
     costs[:, 15] = 255.0
-    mud = write(tmp_path / "mud.tif", costs)
+    mud = written(tmp_path / "mud.tif", costs)
     cells, smooth = (
         tp.read_surface(dem, costs={"mud": mud}, smooth_costs=s) for s in (False, True)
     )
@@ -79,7 +75,7 @@ def test_a_cell_without_a_cost_is_blocked_and_others_keep_theirs(dem, tmp_path):
     costs = np.random.default_rng(1).uniform(1.0, 9.0, (30, 30))
     marked = costs.copy()
     marked[10:13, 5] = -1.0
-    mud = write(tmp_path / "mud.tif", marked, nodata=-1.0)
+    mud = written(tmp_path / "mud.tif", marked, nodata=-1.0)
     surface = tp.read_surface(dem, costs={"mud": mud})
     assert surface.nodata.blocked.sum() == 3
     points, i, j = places(30, 10.0)
@@ -90,20 +86,26 @@ def test_a_cell_without_a_cost_is_blocked_and_others_keep_theirs(dem, tmp_path):
 def test_a_map_in_degrees_takes_the_cost_where_the_centres_lie(tmp_path):
     x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
     place = {"cell": 1e-3, "crs": "EPSG:4326", "corner": (11.0, 47.0)}
-    dem = write(tmp_path / "dem.tif", 20.0 * np.sin(0.2 * x) + y, **place)
+    dem = written(tmp_path / "dem.tif", 20.0 * np.sin(0.2 * x) + y, **place)
     costs = np.where((x + y) % 7 < 2, 50.0, 1.0)
-    surface = tp.read_surface(dem, costs={"mud": write(tmp_path / "mud.tif", costs, **place)})
+    surface = tp.read_surface(dem, costs={"mud": written(tmp_path / "mud.tif", costs, **place)})
     assert set(np.unique(surface.cost_cells.values)) == {1.0, 50.0}
 
 
-def test_the_scenario_key_and_the_flag_say_the_same(dem, tmp_path):
+def test_the_scenario_key_and_the_flag_say_the_same(dem, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     costs = np.ones((30, 30))
     costs[:, 15] = 255.0
-    mud = write(tmp_path / "mud.tif", costs)
+    written(tmp_path / "mud.tif", costs)
     (tmp_path / "a.toml").write_text(
         '[map]\npath = "dem.tif"\nsmooth_costs = true\n[map.costs.mud]\nfile = "mud.tif"\n'
         "[route]\nstart = [500050.0, 5200150.0]\ngoal = [500250.0, 5200150.0]\n"
     )
-    loaded = scenario.load(tmp_path / "a.toml")
-    assert loaded.map.smooth_costs
-    assert mud
+
+    def value(*given):
+        assert run(["plan", *given, "--planner", "dijkstra", "--json"]) == 0
+        return json.loads(capsys.readouterr().out)["value"]
+
+    ends = ["--start", "500050,5200150", "--goal", "500250,5200150"]
+    flags = ["dem.tif", "--cost", "mud=mud.tif", *ends]
+    assert value("a.toml") == value(*flags, "--smooth-costs") != value(*flags)

@@ -74,10 +74,11 @@ def test_modes_thresholds_and_negation_mean_what_map_server_means(tmp_path, mode
             value = 0
         else:
             value = None if mode == "trinary" else min(99, round((occupied - 0.2) / 0.4 * 100))
-        place = (-2.0 + 0.5 * (column + 0.5), 4.0)
         is_blocked = surface.nodata.blocked[4, column + 1]
         assert is_blocked == (value is None or value == 100), (shade, value)
-        assert place[0] < surface.bounds.x1_max
+        if not is_blocked:
+            place = (-2.0 + 0.5 * (column + 0.5), 3.0 + 0.5 * 3.5)
+            assert surface.cost(place) == 1.0 + value, (shade, value)
 
 
 def test_a_turned_map_of_nav2_lies_where_its_origin_says(tmp_path):

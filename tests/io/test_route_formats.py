@@ -21,6 +21,7 @@ from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
 
 import terrapath as tp
+from common import made_up
 from terrapath._support.files import SHAPEFILE_PARTS, folder_written_whole, require_writable
 from terrapath.io.routes import WRITERS, require_fitting_format
 from terrapath.io.routes.places import parts_in_degrees
@@ -62,13 +63,9 @@ SURFACES = {plane: surface_on(plane) for plane in PLANES}
 
 
 def solved(surface, points, **changes):
-    """A solution without a planner: the points are the path."""
     problem = tp.Problem(surface, points[0], points[-1], name="made up")
-    path = problem.path(points)
-    given = {"cost": path.length, "seconds": 0.5, "seed": 3, "samples": 10, **changes}
-    return tp.Solution(
-        problem=problem, planner="rrt-star-r", status=tp.Status.SOLVED, path=path, **given
-    )
+    given = {"planner": "rrt-star-r", "seconds": 0.5, "seed": 3, "samples": 10, **changes}
+    return made_up(problem, points, **given)
 
 
 def route_on(plane, seed=0, count=7):

@@ -13,11 +13,11 @@ import gpxpy
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings, strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from scipy.interpolate import RectBivariateSpline
 
 import terrapath as tp
-from common import REAL_MAPS
+from common import REAL_MAPS, made_up
 from terrapath.io.routes import WRITERS
 from terrapath.io.routes.table import defused
 from terrapath.problem.simplification import LENGTH_KEPT
@@ -38,14 +38,6 @@ def rough_ground(seed, cells=81, relief=250.0):
         fx, fy, phase = random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(0, 7)
         heights += relief * size / 4000.0 * np.sin(2 * np.pi * (fx * x + fy * y) / size + phase)
     return heights, axis + ORIGIN[0], axis + ORIGIN[1]
-
-
-def solution_through(problem, points, legs=()):
-    path = problem.path(points)
-    return tp.Solution(
-        problem=problem, planner="made up", status=tp.Status.SOLVED, path=path, cost=path.length,
-        seconds=0.0, legs=legs,
-    )  # fmt: skip
 
 
 def wiggly(problem, count, seed, turns=9):
@@ -103,7 +95,7 @@ def test_22_km_on_cells_of_90_m_are_hundreds_of_points(seed, weight, tmp_path):
     surface = tp.Surface.from_grid(heights, x, y, units=["m"], weights=[weight], georeference=UTM)
     problem = tp.Problem(surface, ORIGIN + 3500.0, ORIGIN + 16_500.0)
     planned = wiggly(problem, 39_303, seed)
-    solution, judge = solution_through(problem, planned), Judge(heights, x, y)
+    solution, judge = made_up(problem, planned), Judge(heights, x, y)
     assert solution.path.ground_length > 20_000.0
     points = written_points(solution, tmp_path)
     assert 50 < len(points) < 1000
@@ -118,7 +110,7 @@ def test_a_tolerance_is_kept_and_none_writes_all_points(tmp_path):
     heights, x, y = rough_ground(2)
     surface = tp.Surface.from_grid(heights, x, y, units=["m"], georeference=UTM)
     problem = tp.Problem(surface, ORIGIN + 900.0, ORIGIN + 6000.0)
-    solution, judge = solution_through(problem, wiggly(problem, 3000, 2)), Judge(heights, x, y)
+    solution, judge = made_up(problem, wiggly(problem, 3000, 2)), Judge(heights, x, y)
     counts = []
     for tolerance in (200.0, 9.0, 2.0, 0.5):
         points = written_points(solution, tmp_path, simplify=tolerance)
@@ -154,8 +146,7 @@ def test_simplified_routes_touch_nothing(seed, kind, tmp_path_factory):
     given_obstacles = obstacles.get(kind) or [*obstacles["mask"], *discs]
     problem = tp.Problem(surface, start, goal, obstacles=given_obstacles)
     solution = tp.plan(problem, "dijkstra", refine=True, bound=False)
-    if solution.path is None:
-        return
+    assume(solution.path is not None)
     folder = tmp_path_factory.mktemp("r")
     for tolerance in (None, 60.0, 500.0):
         points = written_points(solution, folder, simplify=tolerance)
@@ -177,11 +168,11 @@ def test_stops_are_kept(tmp_path):
     points = ORIGIN + CELL * np.array([(5, 5), (20.25, 5), (40, 5), (60, 5.0)])
     problem = tp.Problem(surface, points[0], points[-1])
     legs = tuple(
-        solution_through(tp.Problem(surface, *ends), ends) for ends in (points[:2], points[1:])
+        made_up(tp.Problem(surface, *ends), ends) for ends in (points[:2], points[1:])
         if len(ends) == 2
     )  # fmt: skip
-    legs += (solution_through(tp.Problem(surface, points[1], points[-1]), points[1:]),)
-    solution = solution_through(problem, points, legs)
+    legs += (made_up(tp.Problem(surface, points[1], points[-1]), points[1:]),)
+    solution = made_up(problem, points, legs=legs)
     assert written_points(solution, tmp_path).tolist() == points[[0, 1, 3]].tolist()
 
 
@@ -194,7 +185,7 @@ def test_every_format_has_the_same_points_and_numbers(ending, tmp_path):
         georeference=UTM,
     )  # fmt: skip
     problem = tp.Problem(surface, ORIGIN + 900.0, ORIGIN + 6000.0, name="over the hill")
-    solution = solution_through(problem, wiggly(problem, 2000, 4))
+    solution = made_up(problem, wiggly(problem, 2000, 4))
     lonlat = UTM.to_lonlat(written_points(solution, tmp_path))
     target = tmp_path / f"route{ending}"
     tp.write_route(solution, target)
@@ -228,7 +219,7 @@ def test_a_record_holds_every_planned_point(tmp_path):
     heights, x, y = rough_ground(5)
     surface = tp.Surface.from_grid(heights, x, y, units=["m"], georeference=UTM)
     problem = tp.Problem(surface, ORIGIN + 900.0, ORIGIN + 6000.0)
-    solution = solution_through(problem, wiggly(problem, 2000, 4))
+    solution = made_up(problem, wiggly(problem, 2000, 4))
     tp.write_route(solution, tmp_path / "route.json")
     record = json.loads((tmp_path / "route.json").read_text())
     assert record["path"] == solution.path.points.tolist()
@@ -242,7 +233,7 @@ def test_a_robot_has_a_pose_in_every_cell(tmp_path):
     heights, x, y = rough_ground(6)
     surface = tp.Surface.from_grid(0 * heights, x, y, units=["m"], georeference=UTM)
     problem = tp.Problem(surface, ORIGIN + 900.0, ORIGIN + 6000.0)
-    solution = solution_through(problem, np.array([problem.start, problem.goal]))
+    solution = made_up(problem, np.array([problem.start, problem.goal]))
     assert len(Route.of(solution).points) == 2
     steps = np.hypot(*np.diff(Route.of(solution, dense=True).points, axis=0).T)
     assert 0.25 * CELL < steps.max() <= CELL
@@ -274,7 +265,7 @@ def test_no_heading_of_a_csv_is_a_formula(name, tmp_path):
         np.stack([heights, heights]), x, y, names=["height", name], georeference=UTM
     )
     problem = tp.Problem(surface, ORIGIN + 900.0, ORIGIN + 6000.0)
-    tp.write_route(solution_through(problem, wiggly(problem, 50, 0)), tmp_path / "route.csv")
+    tp.write_route(made_up(problem, wiggly(problem, 50, 0)), tmp_path / "route.csv")
     text = (tmp_path / "route.csv").read_text(encoding="utf-8").splitlines()[0]
     for delimiter in ",;\t":  # as spreadsheets of several countries read it
         for cell in next(csv.reader([text], delimiter=delimiter)):
@@ -293,7 +284,7 @@ def test_a_shapefile_replaces_its_own_parts_and_no_others(tmp_path):
     heights, x, y = rough_ground(8)
     surface = tp.Surface.from_grid(heights, x, y, units=["m"], georeference=UTM)
     problem = tp.Problem(surface, ORIGIN + 900.0, ORIGIN + 6000.0)
-    solution = solution_through(problem, wiggly(problem, 50, 0))
+    solution = made_up(problem, wiggly(problem, 50, 0))
     (tmp_path / "dem.prj").write_text("of dem.asc")
     with pytest.raises(tp.MapError, match=r"dem\.prj.*another file"):
         tp.write_route(solution, tmp_path / "dem.shp")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import pytest
 
 import terrapath as tp
+from common import made_up
 from processes import in_another_process
 from terrapath.planners import PLANNERS, Finished, make_planner, plan_tour
 from terrapath.planners.base import PROVING, least_limit, options_of
@@ -58,15 +59,7 @@ class Straight:
     name = "straight"
 
     def solve(self, problem, *, callback=None):
-        path = problem.path([problem.start, problem.goal])
-        return tp.Solution(
-            problem=problem,
-            planner=self.name,
-            status=tp.Status.SOLVED,
-            path=path,
-            cost=path.length,
-            seconds=0.0,
-        )
+        return made_up(problem, [problem.start, problem.goal], planner=self.name)
 
 
 @pytest.mark.parametrize("planner", [Straight(), Finished(planner=Straight(), refine=True)])

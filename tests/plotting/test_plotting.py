@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import terrapath as tp
+from common import made_up
 from terrapath.plotting import (
     draw_field,
     draw_page,
@@ -368,11 +369,8 @@ def test_far_from_zero_a_page_counts_from_a_nearer_corner():
     x, y = 4_100_000.25 + axis, 512_000.5 + axis
     surface = tp.Surface.from_grid(np.outer(axis, axis) / 1000, x, y)
     problem = tp.Problem(surface, (x[1], y[1]), (x[7], y[6]))
-    path = problem.path([problem.start, problem.goal])
-    solution = tp.Solution(
-        problem=problem, planner="rrt", status=tp.Status.SOLVED, path=path, cost=1.0, seconds=0.0
-    )
-    figure = draw_page(solution)
+    solution = made_up(problem, [problem.start, problem.goal])
+    path, figure = solution.path, draw_page(solution)
     route = next(trace for trace in figure.data if trace.name == "route")
     np.testing.assert_array_equal(route.x + 4_100_000, path.profile.points[:, 0])
     np.testing.assert_array_equal(route.customdata[:, 4:6], path.profile.points)
@@ -405,10 +403,7 @@ def test_names_of_any_letters_are_drawn(tmp_path):
     names = ["height", "a $ and $^ of\n\u2028\udc80 <b>", "%{x} $\\frac$"]
     surface = tp.Surface.from_grid(values, axis, axis, names=names, units=["$", "\x00", "m^2$$"])
     problem = tp.Problem(surface, (1, 1), (9, 8), name="$\\undefined$ \udc80")
-    path = problem.path([problem.start, problem.goal])
-    solution = tp.Solution(
-        problem=problem, planner="rrt", status=tp.Status.SOLVED, path=path, cost=1.0, seconds=0.0
-    )
+    solution = made_up(problem, [problem.start, problem.goal])
     for plot, name in ((plot_profile, "p.svg"), (plot_route, "r.png"), (plot_page, "p.html")):
         plot(solution, tmp_path / name)
     assert "a $ and $^ of" in draw_profile(solution).axes[2].get_ylabel().replace("\\$", "$")

@@ -11,6 +11,7 @@ import pytest
 from scipy.interpolate import RectBivariateSpline
 
 import terrapath as tp
+from common import made_up
 from terrapath.surface.georeference import Georeference
 
 SURVEY_FOOT = 1200 / 3937
@@ -99,10 +100,7 @@ def test_a_value_has_a_unit_of_its_own_where_it_is_no_length_on_the_ground(case)
     surface, points = surface_of(case), wandering(3)
     problem = tp.Problem(surface, points[0], points[-1])
     path = problem.path(points)
-    solution = tp.Solution(
-        problem=problem, planner="made up", status=tp.Status.SOLVED, path=path, cost=1.0,
-        seconds=0.0, lower_bound=0.5 * path.length,
-    )  # fmt: skip
+    solution = made_up(problem, points, lower_bound=0.5 * path.length)
     plain = surface.unit or "units"
     assert solution.unit == (surface.unit if case in PLAIN else f"weighted {plain}")
     assert solution.value == solution.length == tp.curve_length(surface, points)
@@ -121,11 +119,8 @@ def test_a_small_gap_is_a_number_and_a_bound_of_zero_proves_nothing():
     problem = tp.Problem(surface, points[0], points[-1])
     words = {}
     for share in (1.0, 1 / 1.05, 0.0):
-        path = problem.path(points)
-        words[share] = tp.Solution(
-            problem=problem, planner="made up", status=tp.Status.SOLVED, path=path, cost=1.0,
-            seconds=0.0, lower_bound=share * path.length,
-        ).gap_in_words  # fmt: skip
+        lower_bound = share * problem.path(points).length
+        words[share] = made_up(problem, points, lower_bound=lower_bound).gap_in_words
     assert words[1.0] == "0 %"
     assert words[1 / 1.05] == "5 %"
     assert "nothing is proven" in words[0.0]
@@ -157,10 +152,8 @@ def test_a_path_is_tested_once_whatever_else_of_a_solution_changes(monkeypatch):
     tested = []
     allows = tp.Problem.allows
     monkeypatch.setattr(tp.Problem, "allows", lambda self, p: tested.append(p) or allows(self, p))
-    path = problem.path([problem.start, (2, 8), problem.goal])
-    solution = tp.Solution(
-        problem=problem, planner="made up", status=tp.Status.SOLVED, path=path, cost=1.0, seconds=0
-    )
+    solution = made_up(problem, [problem.start, (2, 8), problem.goal])
+    path = solution.path
     for seconds in range(5):
         solution = replace(solution, seconds=float(seconds))
     assert tested == [path]

@@ -6,7 +6,7 @@ import pytest
 import shapely
 
 import terrapath as tp
-from common import FLAT, REGION
+from common import FLAT, REGION, made_up
 
 AREAS = [shapely.box(-1, -1, 6, 11), shapely.box(5, -1, 11, 11)]
 
@@ -46,8 +46,7 @@ WALL = shapely.box(4, 2, 5, 8)
 
 def solution_along(points, **more):
     problem = tp.Problem(FLAT, points[0], points[-1], (0, 0, 10, 10), [WALL])
-    given = {"status": tp.Status.SOLVED, "cost": 1.0, "seconds": 0.0, **more}
-    return tp.Solution(problem=problem, planner="some", path=problem.path(points), **given)
+    return made_up(problem, points, **more)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import shapely
 from rasterio.transform import from_origin
 from typer.main import get_command
 
-import terrapath as tp
+from common import made_up
 from terrapath.cli.main import run
 from terrapath.scenario import answers
 from terrapath.scenario.outputs import RouteOutputs
@@ -130,15 +130,7 @@ def straight_answer(run):
     Where that touches an obstacle the solution does not return it: exit code 3.
     """
     problem = run._itinerary().problem
-    solution = tp.Solution(
-        problem=problem,
-        planner=run.planner.name,
-        status=tp.Status.SOLVED,
-        path=problem.path([problem.start, problem.goal]),
-        cost=1.0,
-        seconds=0.0,
-    )
-    return solution, ()
+    return made_up(problem, [problem.start, problem.goal], planner=run.planner.name), ()
 
 
 def give_up(*_):

@@ -12,7 +12,7 @@ from rasterio import Affine
 import terrapath as tp
 from common import REAL_MAPS
 from horn import horn_degrees
-from rasters import UTM, write
+from rasters import UTM, blocked_at, centres_on_plane, write
 from terrapath.errors import BlockedError
 from terrapath.space.slope_limit import SlopeLimit
 from terrapath.surface.bounds import Bounds
@@ -32,16 +32,6 @@ def rough(seed, shape=(40, 50), holes=0.03):
 
 def limit_of(surface, degrees, *measure):
     return SlopeLimit(surface, degrees, surface.bounds, *measure)
-
-
-def is_steep(mask, points):
-    """Which points of the plane lie in blocked cells of a mask."""
-    i, j = (
-        np.rint((points[..., k] - axis[0]) / (axis[1] - axis[0])).astype(int)
-        for k, axis in enumerate((mask.x, mask.y))
-    )
-    inside = (i >= 0) & (j >= 0) & (i < len(mask.x)) & (j < len(mask.y))
-    return inside & mask.blocked[np.where(inside, j, 0), np.where(inside, i, 0)]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -66,11 +56,6 @@ def in_degrees(latitude, shape, cell=1 / 1200):
     return transform, np.radians(cell) * across, np.radians(cell) * along
 
 
-def centres_on_plane(surface, transform, shape):
-    j, i = np.mgrid[: shape[0], : shape[1]]
-    return surface.georeference.from_map(np.stack(transform * (i + 0.5, j + 0.5), axis=-1))
-
-
 @pytest.mark.parametrize("latitude", [0.05, 47.0, -68.0])
 def test_in_degrees_cells_are_as_steep_as_with_their_true_sides(tmp_path, latitude):
     heights = 15.0 * rough(5, (60, 50))
@@ -81,7 +66,7 @@ def test_in_degrees_cells_are_as_steep_as_with_their_true_sides(tmp_path, latitu
     known = np.isfinite(slopes)
     centres = centres_on_plane(surface, transform, heights.shape)[known]
     for limit in np.nanquantile(slopes, [0.3, 0.6, 0.9]):
-        found = is_steep(limit_of(surface, float(limit)).mask, centres)
+        found = blocked_at(limit_of(surface, float(limit)).mask, centres)
         # Neighbouring cells have slopes that nothing relates; on real ground it is 97 %.
         assert (found == (slopes[known] > limit)).mean() > 0.95
         assert found.mean() == pytest.approx((slopes[known] > limit).mean(), abs=0.02)
@@ -95,7 +80,7 @@ def test_a_plane_in_degrees_has_its_slope_everywhere(tmp_path):
     surface = tp.read_surface(path)
     assert limit_of(surface, 30.1).mask is None
     steep = limit_of(surface, 29.9).mask
-    assert is_steep(steep, centres_on_plane(surface, transform, shape)).all()
+    assert blocked_at(steep, centres_on_plane(surface, transform, shape)).all()
 
 
 def test_the_strict_measure_blocks_what_horn_does_and_more(tmp_path):
@@ -108,7 +93,7 @@ def test_the_strict_measure_blocks_what_horn_does_and_more(tmp_path):
         surface = tp.read_surface(write(tmp_path / "dem.tif", heights, place, crs), smoothing=None)
         strict = limit_of(surface, 30.0, "steepest").mask
         centres = np.stack(np.meshgrid(strict.x, strict.y), axis=-1)
-        horn = is_steep(limit_of(surface, 30.0).mask, centres)
+        horn = blocked_at(limit_of(surface, 30.0).mask, centres)
         assert (strict.blocked | ~horn)[~surface.nodata.blocked].mean() > 0.98
         assert strict.blocked.mean() > horn.mean() + 0.05
 
@@ -175,10 +160,10 @@ def test_a_real_map_in_degrees_is_blocked_where_gdaldem_says_in_utm(tmp_path):
     points = np.stack(there.transform(*places.T), axis=-1)
     for limit in (30, 35, 40, 42):
         expected = theirs[rows, columns] > limit
-        found = is_steep(limit_of(surface, limit).mask, points)
+        found = blocked_at(limit_of(surface, limit).mask, points)
         assert found.mean() == pytest.approx(expected.mean(), abs=0.02)
         assert (found == expected).mean() > 0.97
-        assert (is_steep(limit_of(in_utm, limit).mask, places) == expected).mean() > 0.9999
+        assert (blocked_at(limit_of(in_utm, limit).mask, places) == expected).mean() > 0.9999
 
 
 @needs_srtm

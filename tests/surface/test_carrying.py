@@ -7,31 +7,21 @@ from rasterio import Affine
 
 import terrapath as tp
 from common import REAL_MAPS
-from rasters import write
+from rasters import blocked_at, centres_on_plane, write
+from rough_maps import fractal
 from terrapath.space.lattice import Spacing, default_spacing
 from terrapath.surface.bounds import Bounds
 
 SRTM = REAL_MAPS / "srtm_oetztal.tif"
 
 
-def fractal(seed, shape, roughness=1.9):
-    """Rough ground: a random field whose waves grow with their length."""
-    waves = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None])
-    waves[0, 0] = 1.0
-    noise = np.fft.rfft2(np.random.default_rng(seed).normal(size=shape))
-    field = np.fft.irfft2(noise * waves**-roughness, s=shape)
-    return 1500.0 + 500.0 * (field - field.mean()) / field.std()
-
-
-def places_of(surface, transform, shape):
-    """The centres of a map's cells on the plane."""
-    j, i = np.mgrid[: shape[0], : shape[1]]
-    places = np.stack(transform * (i + 0.5, j + 0.5), axis=-1)
-    return surface.georeference.from_map(places)
+def rough(seed, shape):
+    """Rough ground, metres."""
+    return 1500.0 + 500.0 * fractal(np.random.default_rng(seed), *shape, 1.9)
 
 
 def check_heights(surface, heights, transform, rms, most):
-    places = places_of(surface, transform, heights.shape)
+    places = centres_on_plane(surface, transform, heights.shape)
     known = np.isfinite(heights)
     assert surface.bounds.contains(places[known]).all()
     off = surface.values(places[known])[:, 0] - heights[known]
@@ -67,36 +57,30 @@ SECOND = 1.0 / 3600.0
     ],
 )
 def test_rough_ground_has_the_heights_of_its_file(tmp_path, crs, transform):
-    heights = fractal(3, (120, 140))
+    heights = rough(3, (120, 140))
     heights[40:47, 50:58] = np.nan
     surface = tp.read_surface(write(tmp_path / "dem.tif", heights, transform, crs))
     check_heights(surface, heights, transform, 0.05, 1.0)
 
 
 def test_the_climb_of_a_line_is_that_of_the_file(tmp_path):
-    heights = fractal(4, (200, 200))
+    heights = rough(4, (200, 200))
     transform = Affine(SECOND, 0.0, 11.0, 0.0, -SECOND, 47.0)
     surface = tp.read_surface(write(tmp_path / "dem.tif", heights, transform, "EPSG:4326"))
-    row = places_of(surface, transform, heights.shape)[77]
+    row = centres_on_plane(surface, transform, heights.shape)[77]
     climb = np.maximum(np.diff(surface.values(row)[:, 0]), 0.0).sum()
     assert climb == pytest.approx(np.maximum(np.diff(heights[77]), 0.0).sum(), rel=0.001)
-
-
-def blocked_at(mask, points):
-    i = np.rint((points[..., 0] - mask.x[0]) / mask.spacing[0]).astype(int)
-    j = np.rint((points[..., 1] - mask.y[0]) / mask.spacing[1]).astype(int)
-    return mask.blocked[j, i]
 
 
 @pytest.mark.parametrize("latitude", [3.0, 47.0, -70.0])
 def test_every_cell_without_data_is_blocked_and_no_other(tmp_path, latitude):
     random = np.random.default_rng(8)
-    heights = fractal(5, (90, 110))
+    heights = rough(5, (90, 110))
     heights[random.random(heights.shape) < 0.05] = np.nan
     heights[30], heights[:, 40] = np.nan, np.nan  # walls of one cell
     transform = Affine(SECOND, 0.0, 11.0, 0.0, -SECOND, latitude)
     surface = tp.read_surface(write(tmp_path / "dem.tif", heights, transform, "EPSG:4326"))
-    places = places_of(surface, transform, heights.shape)
+    places = centres_on_plane(surface, transform, heights.shape)
     np.testing.assert_array_equal(blocked_at(surface.nodata, places), np.isnan(heights))
     # No path leads through the walls.
     free = np.argwhere(np.isfinite(heights))
@@ -106,19 +90,19 @@ def test_every_cell_without_data_is_blocked_and_no_other(tmp_path, latitude):
 
 
 def test_small_holes_are_filled_by_their_size_in_metres(tmp_path):
-    heights = fractal(6, (60, 60))
+    heights = rough(6, (60, 60))
     heights[20:22, 20:22] = np.nan
     heights[40:44, 40:42] = np.nan
     transform = Affine(SECOND, 0.0, 11.0, 0.0, -SECOND, 47.0)
     path = write(tmp_path / "dem.tif", heights, transform, "EPSG:4326")
     surface = tp.read_surface(path, fill_holes=70.0)  # cells are 21 x 31 metres
-    found = blocked_at(surface.nodata, places_of(surface, transform, heights.shape))
+    found = blocked_at(surface.nodata, centres_on_plane(surface, transform, heights.shape))
     assert not found[20:22, 20:22].any()
     assert found[40:44, 40:42].all()
 
 
 def test_layers_and_costs_come_along(tmp_path):
-    heights, rocks = fractal(7, (70, 80)), fractal(8, (70, 80))
+    heights, rocks = rough(7, (70, 80)), rough(8, (70, 80))
     costs = np.ones((70, 80))
     costs[:, 40:] = 7.0
     transform = Affine(SECOND, 0.0, 11.0, 0.0, -SECOND, 47.0)
@@ -127,7 +111,7 @@ def test_layers_and_costs_come_along(tmp_path):
         for name, values in (("dem", heights), ("rocks", rocks), ("mud", costs))
     ]
     surface = tp.read_surface(paths[0], layers={"rocks": paths[1]}, costs={"mud": paths[2]})
-    places = places_of(surface, transform, heights.shape)
+    places = centres_on_plane(surface, transform, heights.shape)
     np.testing.assert_allclose(surface.values(places)[..., 1], rocks, atol=0.5)
     found = surface.cost(places)
     np.testing.assert_allclose(found[:, :38], 1.0, rtol=1e-6)
@@ -135,7 +119,7 @@ def test_layers_and_costs_come_along(tmp_path):
 
 
 def test_nodes_are_as_many_as_the_maps_cells(tmp_path):
-    heights = fractal(9, (300, 320))
+    heights = rough(9, (300, 320))
     transform = Affine(SECOND, 0.0, 11.0, 0.0, -SECOND, 47.0)
     surface = tp.read_surface(write(tmp_path / "dem.tif", heights, transform, "EPSG:4326"))
     (west, south), (east, north) = surface.bounds[:2], surface.bounds[2:]
@@ -166,7 +150,7 @@ def test_a_map_with_long_cells_keeps_its_nodes():
 
 def test_a_small_map_in_degrees_is_read_and_a_smaller_one_refused_with_its_own_numbers(tmp_path):
     transform = Affine(SECOND, 0.0, 11.0, 0.0, -SECOND, 70.0)
-    small = fractal(10, (4, 4))
+    small = rough(10, (4, 4))
     surface = tp.read_surface(write(tmp_path / "small.tif", small, transform, "EPSG:4326"))
     check_heights(surface, small, transform, 0.5, 2.0)
     path = write(tmp_path / "smaller.tif", small[:3], transform, "EPSG:4326")
@@ -176,6 +160,6 @@ def test_a_small_map_in_degrees_is_read_and_a_smaller_one_refused_with_its_own_n
 
 def test_beside_a_pole_places_are_still_right(tmp_path):
     transform = Affine(0.01, 0.0, 20.0, 0.0, -0.001, 89.9)
-    heights = fractal(11, (100, 120))
+    heights = rough(11, (100, 120))
     surface = tp.read_surface(write(tmp_path / "pole.tif", heights, transform, "EPSG:4326"))
     check_heights(surface, heights, transform, 0.5, 5.0)

@@ -6,27 +6,20 @@ import numpy as np
 import pytest
 
 import terrapath as tp
-from cost_rasters import CELL, Walker, random_costs, random_heights
+from cost_rasters import CELL, Walker, cell_surface, random_costs, random_heights
 from terrapath.surface import metric
-
-
-def surface_of(costs, heights=None, **options):
-    """Ground under one cost raster, with centres of cells at 0, 10, 20, ..."""
-    x, y = (CELL * np.arange(count) for count in costs.shape[::-1])
-    ground = np.zeros_like(costs) if heights is None else heights
-    return tp.Surface.from_grid([ground, costs], x, y, kinds=["rise", "cells"], **options)
 
 
 def random_map(seed, count=40, steep=0.0):
     random = np.random.default_rng(seed)
     costs, heights = random_costs(random, count), random_heights(random, count, steep)
     axis = CELL * np.arange(count)
-    return surface_of(costs, heights), Walker(costs, heights, axis, axis)
+    return cell_surface(costs, heights), Walker(costs, heights, axis, axis)
 
 
 def test_a_cell_costs_what_the_raster_says():
     costs = np.array([[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]] * 2)
-    surface = surface_of(costs)
+    surface = cell_surface(costs)
     inside = [(0.0, 0.0), (14.9, 5.1), (15.1, 14.9), (30.0, 30.0)]
     np.testing.assert_array_equal(surface.cost(inside), [1.0, 6.0, 7.0, 8.0])
     # On a side and at a corner the lowest cost counts.
@@ -92,13 +85,13 @@ def test_lengths_are_those_over_the_cells(seed, steep):
 def test_along_a_side_the_lower_cost_counts():
     costs = np.ones((6, 6))
     costs[:, 3:] = 100.0
-    surface = surface_of(costs)
+    surface = cell_surface(costs)
     along = metric.segment_lengths(surface, [(25.0, 10.0), (25.001, 10.0)], [(25.0, 40.0)] * 2)
     assert along[0] == pytest.approx(30.0, rel=1e-12)
     assert along[1] > 1000.0
     # Between two dear cells that meet cheap ones at a corner only, the corner is a passage.
     checkered = np.where((np.add.outer(np.arange(6), np.arange(6))) % 2 == 0, 1.0, 100.0)
-    diagonal = metric.segment_lengths(surface_of(checkered), (0.0, 0.0), (50.0, 50.0))
+    diagonal = metric.segment_lengths(cell_surface(checkered), (0.0, 0.0), (50.0, 50.0))
     assert diagonal == pytest.approx(50.0 * math.sqrt(2.0), rel=1e-6)
 
 
@@ -119,7 +112,7 @@ def test_planners_take_each_cells_own_cost(planner, steep):
 
 def test_a_constant_cost_scales_a_field():
     ground = random_heights(np.random.default_rng(5), 30, 0.5)
-    plain, dear = (surface_of(np.full_like(ground, cost), ground) for cost in (1.0, 7.0))
+    plain, dear = (cell_surface(np.full_like(ground, cost), ground) for cost in (1.0, 7.0))
     points = np.random.default_rng(6).uniform(0.0, 290.0, (100, 2))
     one, other = (tp.distance_field(s, (100.0, 120.0)).at(points) for s in (plain, dear))
     np.testing.assert_allclose(other, 7.0 * one, rtol=1e-6)
