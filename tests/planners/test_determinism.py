@@ -11,7 +11,7 @@ import terrapath as tp
 from kernel_copies import KERNELS, copy_machinery
 from planner_oracles import TREE_PLANNERS
 from processes import in_another_process
-from reruns import TREES, problems, trees
+from reruns import SEARCHES, problems, searches
 from terrapath._kernels import cache
 from terrapath.planners import rrt_star
 from terrapath.problem import scenes
@@ -19,14 +19,14 @@ from terrapath.problem import scenes
 
 @pytest.fixture(scope="module")
 def here():
-    return trees()
+    return searches()
 
 
 @pytest.fixture(scope="module")
 def cold_and_warm(tmp_path_factory):
     """Two processes, one after the other, that share a kernel cache which was empty."""
     cache = str(tmp_path_factory.mktemp("kernels"))
-    return [in_another_process(TREES, NUMBA_CACHE_DIR=cache) for _ in range(2)]
+    return [in_another_process(SEARCHES, NUMBA_CACHE_DIR=cache) for _ in range(2)]
 
 
 def assert_same_bits(a, b):
@@ -103,7 +103,7 @@ def test_a_longer_run_begins_as_the_shorter_one(options, monkeypatch):
 
 
 def test_another_process_finds_the_same_bits(here):
-    found, statistics = in_another_process(TREES)
+    found, statistics = in_another_process(SEARCHES)
     assert found == here
     assert statistics["loaded"] + statistics["compiled"] > 0
 
@@ -125,14 +125,17 @@ def test_a_second_process_compiles_nothing(cold_and_warm):
 
 
 def test_plain_python_agrees_with_the_compiled_kernels(here):
-    found, statistics = in_another_process(TREES, NUMBA_DISABLE_JIT="1")
+    found, statistics = in_another_process(SEARCHES, NUMBA_DISABLE_JIT="1")
     assert statistics == {"loaded": 0, "compiled": 0}
-    assert found.keys() == here.keys()
-    for case, expected in here.items():
-        assert found[case]["parents"] == expected["parents"], case
-        assert found[case]["counters"] == expected["counters"], case
+    assert found["trees"].keys() == here["trees"].keys()
+    for case, expected in here["trees"].items():
+        tree = found["trees"][case]
+        assert tree["parents"] == expected["parents"], case
+        assert tree["counters"] == expected["counters"], case
         for key in ("points", "costs", "path", "cost", "length"):
-            np.testing.assert_allclose(found[case][key], expected[key], rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(tree[key], expected[key], rtol=1e-9, atol=1e-9)
+    for case, expected in here["rough ground"].items():
+        np.testing.assert_allclose(found["rough ground"][case], expected, rtol=1e-9, atol=1e-9)
 
 
 # The stamp of the cache
