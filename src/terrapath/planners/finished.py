@@ -20,6 +20,7 @@ from .base import (
     Callback,
     Planner,
     Progress,
+    before_proof,
     least_limit,
     options_of,
     seconds_left,
@@ -37,8 +38,9 @@ class Finished:
     refine : take the path to the locally shortest one. bound : prove a lower bound on the
     length of every path, on one coarse lattice. target_gap : improve the bound until
     (length - bound) / bound is no more than this; it implies ``bound``. time_limit : seconds
-    for the planner and the finishing together. When time is up, the solution has the path and
-    the bound that there are: a path refined in part, a bound that is no more than the chord.
+    for the planner and the finishing together; a fifth of it is kept for the bound where one is
+    asked for. When time is up, the solution has the path and the bound that there are: a path
+    refined in part, a bound that is no more than the chord.
 
     What the planner itself has refined or proven is not done again. An interrupted solution
     is left as it is. If the finishing fails, the planner's path is kept.
@@ -80,7 +82,9 @@ class Finished:
         Where the callback stops the planner, its path is finished all the same.
         """
         limit = least_limit(self.time_limit, time_limit)
-        searching = least_limit(limit, search_limit)
+        is_proven = self.bound or self.target_gap is not None
+        planning = before_proof(limit) if is_proven else limit
+        searching = least_limit(planning, search_limit)
         solution = solve_within(self.planner, problem, callback, searching)
         return finish(
             replace(solution, options=self._options()),
@@ -102,10 +106,12 @@ def finish(
     callback: Callback | None = None,
 ) -> Solution:
     """A solution, refined and with a lower bound as asked; see ``Finished``."""
+    is_proven = bound or target_gap is not None
     if refine and solution.status is not Status.INTERRUPTED:
-        rest = seconds_left(time_limit, solution.seconds)
+        planning = before_proof(time_limit) if is_proven else time_limit
+        rest = seconds_left(planning, solution.seconds)
         solution = refined(solution, time_limit=rest, callback=callback)
-    if (bound or target_gap is not None) and solution.status is not Status.INTERRUPTED:
+    if is_proven and solution.status is not Status.INTERRUPTED:
         rest = seconds_left(time_limit, solution.seconds)
         solution = with_bound(solution, target_gap=target_gap, time_limit=rest, callback=callback)
     return solution

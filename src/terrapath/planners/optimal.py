@@ -27,6 +27,7 @@ from .base import (
     Progress,
     Stopper,
     answer_without_search,
+    before_proof,
     lattices,
     least_limit,
     status_of,
@@ -103,16 +104,22 @@ class Optimal:
         """
         if (known := answer_without_search(problem, self.name)) is not None:
             return known
-        stopper = Stopper(callback, least_limit(self.time_limit, time_limit))
-        return _Run(self, problem, stopper).solve()
+        limit = least_limit(self.time_limit, time_limit)
+        return _Run(self, problem, callback, limit).solve()
 
 
 class _Run:
     """One run, and what it has found so far."""
 
-    def __init__(self, planner: Optimal, problem: Problem, stopper: Stopper) -> None:
+    def __init__(
+        self,
+        planner: Optimal,
+        problem: Problem,
+        callback: Callback | None,
+        time_limit: float | None,
+    ) -> None:
         self.planner, self.given = planner, problem
-        self.stopper = stopper
+        self.stopper, self.time_limit = Stopper(callback, before_proof(time_limit)), time_limit
         # One direction is solved, so that the other has the same answer.
         self.is_reversed = problem.goal < problem.start
         self.problem = problem
@@ -166,6 +173,7 @@ class _Run:
         solution = self.answer()
         if solution.path is None or self.stopper.stopped_by not in ("", TIME_LIMIT):
             return solution
+        self.stopper.time_limit = self.time_limit
         return self.proven(solution)  # without time, it is at least the chord
 
     def searches(self) -> Iterator[tuple[str, Callable[[], object]]]:
