@@ -117,15 +117,26 @@ def lifted_length(surface, a, b, pieces=4096):
     return np.linalg.norm(np.diff(lifted, axis=0), axis=1).sum()
 
 
-@pytest.mark.parametrize("weight", [1.0, 10.0, 100.0])
-def test_what_a_tree_believes_of_its_edges_is_right_on_rough_ground(weight):
-    surface = rough_surface(1, weight)
-    solution = tp.RRTStar(samples=1500).solve(tp.Problem(surface, (1, 2), (37, 35)))
+def errors_of_edges(solution):
+    """What a tree believes of its edges, over their true lengths, less 1."""
     tree = solution.tree
     children = np.flatnonzero(tree.parents >= 0)
     believed = tree.costs[children] - tree.costs[tree.parents[children]]
     a, b = tree.points[tree.parents[children]], tree.points[children]
-    errors = np.abs(believed / segment_lengths(surface, a, b) - 1.0)
+    return np.abs(believed / segment_lengths(solution.problem.surface, a, b) - 1.0)
+
+
+def test_what_a_tree_believes_of_its_edges_is_right_on_a_real_map():
+    # On the map at its true scale 24 % of the edges were off by more than this.
+    solution = tp.RRTStar(samples=3000).solve(tp.scenes.load("jacksboro"))
+    assert errors_of_edges(solution).max() <= 1e-3
+
+
+@pytest.mark.parametrize("weight", [1.0, 10.0, 100.0])
+def test_what_a_tree_believes_of_its_edges_is_right_on_rough_ground(weight):
+    surface = rough_surface(1, weight)
+    solution = tp.RRTStar(samples=1500).solve(tp.Problem(surface, (1, 2), (37, 35)))
+    errors = errors_of_edges(solution)
     assert np.quantile(errors, 0.99) <= 1e-3
     assert errors.max() <= 1e-2
     assert solution.cost == pytest.approx(solution.length, rel=1e-3)
@@ -167,9 +178,7 @@ def test_a_sum_of_short_chords_is_a_lower_bound_above_the_chord(weight):
     assert (through >= tp.chord(surface, a, b) * (1.0 - 1e-12)).all()
 
 
-@pytest.mark.parametrize(
-    "name", ["one-peak", "three-peaks", "six-peaks", "four-peaks", "jacksboro"]
-)
+@pytest.mark.parametrize("name", sorted(set(tp.scenes.names()) - {"jacksboro"}))
 def test_the_scenes_are_not_rough_so_line_r_measures_their_edges(name):
     problem = tp.scenes.load(name)
     assert not is_rough(problem.surface, problem.bounds)

@@ -17,7 +17,7 @@ from .._kernels.travel.priced import is_directed, least_price
 from ..problem import History, Path, Problem, SearchTree, Solution
 from ..problem.path import sampled
 from ..surface import Surface
-from ..surface.metric import ROUGH_FEATURES, ROUGH_TOLERANCE, chord, is_rough
+from ..surface.metric import LINE_R, chord, edge_rule, is_rough
 from ..validation import (
     Array,
     require_bool,
@@ -55,7 +55,7 @@ DEAR = 1.05
 ALONG_PATH = 8192
 
 # One application of Line-R measures a piece that is at most this many features of the surface long.
-FEATURES_PER_PANEL = 4.0
+FEATURES_PER_PANEL = LINE_R.features
 
 
 def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
@@ -63,19 +63,18 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     # Karaman and Frazzoli (2011), theorem 38 at d = 2; the kernel multiplies by the root of
     # the area that is searched, which is at least that of the free space in it.
     least = 2.0 * math.sqrt(1.5 / math.pi)
-    panel, tolerance = options.panel or FEATURES_PER_PANEL * problem.surface.resolution, 0.0
-    is_open = options.panel is None and options.informed and options.riemannian
-    if is_open and is_rough(problem.priced, bounds):
-        panel, tolerance = ROUGH_FEATURES * problem.surface.resolution, ROUGH_TOLERANCE
+    step, rule = options.step or default_step(problem), LINE_R
+    if options.panel is None and options.informed and options.riemannian:
+        rule = edge_rule(problem.priced, bounds, min(step, default_step(problem)))
     return trees.Options(
         *bounds,
         *problem.start,
         *problem.goal,
-        step=float(options.step or default_step(problem)),
+        step=float(step),
         radius=float(options.radius_factor * least),
         goal_bias=float(options.goal_bias),
-        panel=float(panel),
-        tolerance=tolerance,
+        panel=float(options.panel or rule.features * problem.surface.resolution),
+        tolerance=rule.tolerance,
         riemannian=options.riemannian,
         prune=options.prune,
         informed=options.informed,
@@ -226,9 +225,7 @@ def _path(problem: Problem, tree: trees.Tree) -> Path | None:
     return problem.path(tree.places[visited[::-1], : trees.COST])
 
 
-def _first_path(
-    problem: Problem, options: TreeOptions, callback: Callback | None, is_rough: bool
-) -> FirstPath:
+def _first_path(problem: Problem, options: TreeOptions, callback: Callback | None) -> FirstPath:
     """What an informed tree begins with: the straight line if cheap, else a path over a lattice."""
     if not options.informed:
         return FirstPath(None)
@@ -238,7 +235,8 @@ def _first_path(
         return FirstPath(straight, time.perf_counter() - started)
     from .first_path import path_over_lattices
 
-    return path_over_lattices(problem, options, callback, straight, is_rough)
+    on_rough = options.riemannian and is_rough(problem.priced, problem.bounds)
+    return path_over_lattices(problem, options, callback, straight, on_rough)
 
 
 def _best(search: _Search) -> tuple[Path | None, float | None]:
@@ -283,7 +281,7 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     if answer is not None:
         return answer
     settings = _kernel_options(problem, options)
-    first = _first_path(problem, options, callback, settings.tolerance > 0.0)
+    first = _first_path(problem, options, callback)
     root = first.branch or first.path
     branch = None if root is None else sampled(root.points, settings.step)
     tree = _allocate(options.samples, problem.priced, branch)
@@ -328,8 +326,8 @@ class RRTStar:
         of the region is sampled, as in the paper.
     prune : do not measure edges whose chord is already too long; the tree stays the same.
     panel : longest piece of an edge that one application of Line-R measures, map units; by
-        default as long as the surface's features allow, and on rough ground edges of informed
-        trees are measured adaptively; ``math.inf`` is exactly Algorithm 1.
+        default as long as the surface's features allow, and where that is not right to 1e-3
+        edges of informed trees are measured adaptively; ``math.inf`` is exactly Algorithm 1.
     time_limit : seconds. target_length : stop when the cost is this low, map units.
 
     Source: the paper. What it leaves open is described in ``_kernels/planners/rrt_star.py``.
