@@ -12,6 +12,7 @@ import numpy as np
 from ..compiler import inner_kernel, kernel
 from ..distance.surface_ray import surface_piece
 from ..space.free_space import segment_is_free
+from ..surface.lengths import gauss
 from ..surface.speeds import speed_at
 from ..surface.surfaces import (
     has_cells,
@@ -29,6 +30,9 @@ from ..travel.priced import per_price
 INNER, OUTER = 0.5384693101056831, 0.9061798459386640
 MIDDLE_WEIGHT = 0.5688888888888889
 INNER_WEIGHT, OUTER_WEIGHT = 0.4786286704993665, 0.2369268850561891
+
+# A segment that is no longer than this share of a panel needs three points.
+SHORT = 0.6
 
 # A pivot of Newton's method is at least this share of the sum of second differences.
 LEAST_PIVOT = 0.1
@@ -63,8 +67,10 @@ def pair(surface, x, y, vx, vy, share):
 
 @kernel
 def gauss_length(surface, frame, ax, ay, bx, by):
-    """The length of a segment by Gauss's rule of five points, in equal panels."""
+    """The length of a segment by Gauss's rule of five points, in equal panels; if short, of three."""
     across = max(abs(bx - ax) / frame.longest_x, abs(by - ay) / frame.longest_y)
+    if across <= SHORT:
+        return gauss(surface, ax, ay, bx - ax, by - ay)
     panels = max(math.ceil(across), 1)
     vx, vy = (bx - ax) / panels, (by - ay) / panels
     total = 0.0

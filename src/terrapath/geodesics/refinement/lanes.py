@@ -265,6 +265,7 @@ class _Stage:
         places[:, 0], places[:, 1] = self.points, self.around.places[count, choices]
         places[:, 2], places[:, 3] = self.points + step, self.points + PART * step
         places[self.changed == 0, 1:] = math.nan
+        places[choices == 0, 1] = places[steps == 0.0, 2:] = math.nan  # where a point would stay
         self.ground.fill(self.ahead, self.changed | self.before)
         length = kernels.choose(self.ahead, choices)
         self.move(places[count, choices])
