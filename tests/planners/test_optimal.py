@@ -11,7 +11,7 @@ from common import FLAT, REAL_MAPS, REGION, mostly_slow
 from planner_oracles import visibility_length
 from terrapath.errors import UnfinishedWarning
 from terrapath.geodesics import alternatives
-from terrapath.planners import optimal
+from terrapath.planners import candidates
 from terrapath.problem import scenes
 
 START, GOAL = (0.0, 0.0), (10.0, 10.0)
@@ -129,7 +129,7 @@ def raising(monkeypatch):
             return refine(problem, path, **limits)
 
         monkeypatch.setattr(alternatives, "refine", refine_or_raise)
-        monkeypatch.setattr(optimal, "SURE", np.inf)  # no other search follows
+        monkeypatch.setattr(candidates, "SURE", np.inf)  # no other search follows
 
     return patch
 
@@ -302,7 +302,7 @@ def test_a_route_that_touches_does_not_hide_the_others(monkeypatch):
     wall = shapely.box(4.0, -1.0, 5.0, 6.0)
     problem = tp.Problem(FLAT, (0.0, 0.0), (9.0, 0.0), REGION, [wall])
     through = problem.path([(0.0, 0.0), (9.0, 0.0)])
-    monkeypatch.setattr(optimal, "refine", lambda problem, path, **options: through)
+    monkeypatch.setattr(candidates, "refine", lambda problem, path, **options: through)
     solution = tp.plan(problem, "optimal", target_gap=10.0)
     assert solution.status is tp.Status.SOLVED
     assert solution.path.line.disjoint(wall)

@@ -87,6 +87,7 @@ def routes_of_fields(
     count: int,
     *,
     only_shorter: bool = False,
+    rival: float = math.inf,
     failed: Callable[[Exception], object],
     must_stop: MustStop = never,
     is_late: MustStop = never,
@@ -95,20 +96,20 @@ def routes_of_fields(
 
     fields : from the start and from the goal, on one lattice. direct : the path down the first; no
     routes where it is None. count : routes that are asked for; more are tried, because a later one
-    may be shorter. only_shorter : then only those that may be
-    shorter than all before, as far as the fields are right about the best. failed : is called with
-    the error where a route cannot be refined. must_stop : is asked after each candidate whether to
-    end the search. is_late : is asked many times a second; when it says True, the route in hand is
-    not refined any further.
+    may be shorter. only_shorter : then only those that may be shorter than all before, as far as
+    the fields are right about the best. rival : the length of a route that is known; with
+    ``only_shorter`` they must be shorter than that, too. failed : is called with the error where a
+    route cannot be refined. must_stop : is asked after each candidate whether to end the search.
+    is_late : is asked many times a second; when it says True, the route in hand is not refined any
+    further.
     """
     if direct is None:
         return
     found: list[Path] = []
-    rival = math.inf
     value = float(fields[0].at(problem.goal))
     for tries, candidate in enumerate(_candidates(problem, fields, direct, value), 1):
-        if only_shorter and len(found) >= count:
-            best = min(route.length for route in found)
+        if only_shorter and (len(found) >= count or rival < math.inf):
+            best = min([rival, *(route.length for route in found)])
             doubt = min(abs(best / value - 1.0), MOST_DOUBT) + SAME_VALUE
             if candidate.value > best * (1.0 + doubt):
                 break

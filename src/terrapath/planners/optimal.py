@@ -2,57 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 
-from ..distance.field import DistanceField, march_both
-from ..distance.medium import Medium
 from ..errors import tell_unfinished
-from ..geodesics.alternatives import is_same, routes_of_fields, shortest
-from ..geodesics.refinement import refine
-from ..geodesics.visibility import is_flat, shortest_taut_path
+from ..geodesics.alternatives import shortest
 from ..problem import Path, Problem, Solution, Status
-from ..space.lattice import Lattice, Spacing
-from ..surface.bounds import Bounds
-from ..surface.metric import is_rough
 from ..validation import require_count, require_positive
 from .base import (
     INTERRUPT,
-    REFINING,
-    SEARCHING,
     TIME_LIMIT,
     Callback,
-    Progress,
     Stopper,
     answer_without_search,
     before_proof,
-    lattices,
     least_limit,
     status_of,
-    straight_path,
 )
+from .candidates import Candidates
 from .finished import with_bound
-from .grid_search import AStar
-from .rrt_star import RRTStar
-
-# A field whose value at the goal is this near to the length of the best route, as a share, is taken
-# to show every route that could be shorter. Elsewhere other searches follow, and finer fields.
-SURE = 1e-4
-
-# A finer field is solved where the best route may be this share longer than what a field says, at
-# least; and while that takes no more nodes than this.
-SLACK, MOST_NODES = 0.02, 1_000_000
-
-# A search that shortens the best route by no more than this share has found nothing.
-GAIN = 1e-6
-
-# On rough ground the best route is refined again, at most so many times.
-MOST_POLISHES = 4
-
-# The numbers of neighbours with which A* looks for routes.
-NEIGHBOURS = (32, 16, 8)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +29,8 @@ class Optimal:
     target_gap : (length - lower bound) / lower bound to reach. routes : how many locally
     shortest routes to look for. The shortest is the path, the others are its alternatives.
     spacing : of the nodes on which routes are searched first, map units; by default a 250th of the
-    region's longer side, or a cell of the map where that is less. time_limit : seconds.
+    region's longer side, or a cell of the map where that is less. time_limit : seconds; a fifth of
+    it is kept for the proof.
 
     Candidates are the straight line, on flat ground the shortest path round the corners of
     obstacles, and the routes of the distance fields from both ends. Where the fields leave a
@@ -109,7 +77,7 @@ class Optimal:
 
 
 class _Run:
-    """One run, and what it has found so far."""
+    """One run: candidates in one direction, and an answer in the one that was asked for."""
 
     def __init__(
         self,
@@ -122,51 +90,13 @@ class _Run:
         self.stopper, self.time_limit = Stopper(callback, before_proof(time_limit)), time_limit
         # One direction is solved, so that the other has the same answer.
         self.is_reversed = problem.goal < problem.start
-        self.problem = problem
         if self.is_reversed:
-            self.problem = problem.between_checked(problem.goal, problem.start)
-        first = next(lattices(self.problem, planner.spacing))
-        self.samples, self.total = 0, 2 * first.nx * first.ny
-        self.direct: Path | None = None
-        self.found: list[Path] = []
-        self.searched: dict[AStar | RRTStar, Path | None] = {}
-        self.tried: set[AStar | RRTStar] = set()
-        self.failures: list[Exception] = []
-        self.trying = SEARCHING
-        self.is_exact = self.is_sure = self.is_through_cells = False
-        self.fields: tuple[DistanceField, DistanceField]  # of both ends, on the last lattice
-
-    @property
-    def best(self) -> float:
-        """The length of the best path so far, map units."""
-        known = self.found if self.direct is None else [*self.found, self.direct]
-        return min((path.length for path in known), default=math.inf)
-
-    @property
-    def rival(self) -> float:
-        """The length that a further route must be below to be of use, map units."""
-        if len(self.found) < self.planner.routes:
-            return math.inf
-        return min(path.length for path in self.found)
-
-    def must_stop(self, settled: int = 0) -> bool:
-        progress = Progress(
-            self.samples + settled,
-            max(self.total, self.samples + settled),
-            self.stopper.seconds,
-            self.best,
-            stage=self.trying,
-        )
-        return self.stopper.must_stop(progress)
+            problem = problem.between_checked(problem.goal, problem.start)
+        self.candidates = Candidates(problem, self.stopper, planner.routes, planner.spacing)
 
     def solve(self) -> Solution:
         try:
-            for what, search in self.searches():
-                self.trying = what
-                search()
-                if self.is_sure or self.must_stop():
-                    break
-            self.polish()
+            self.candidates.search()
         except KeyboardInterrupt:
             self.stopper.stopped_by = INTERRUPT
         self.tell_failures()
@@ -176,187 +106,12 @@ class _Run:
         self.stopper.time_limit = self.time_limit
         return self.proven(solution)  # without time, it is at least the chord
 
-    def searches(self) -> Iterator[tuple[str, Callable[[], object]]]:
-        """The searches in their order, with what the progress calls each."""
-        yield "trying the straight line", self.try_straight_line
-        if self.problem.surface.cost_cells is not None:
-            yield "trying the sides of cells", self.try_sides
-            yield "trying A*", partial(self.try_planner, AStar(neighbours=NEIGHBOURS[0]))
-        if is_flat(self.problem):
-            yield "trying the corners of obstacles", self.try_corners
-        elif is_rough(self.problem.surface, self.problem.bounds):
-            # The fields' own paths are long there before they are refined, which takes its time.
-            yield "trying A*", partial(self.try_planner, AStar())
-            yield "trying a tree", partial(self.search, RRTStar())
-        yield "trying distance fields", self.try_fields
-        yield "trying finer fields", self.try_finer_fields
-        for neighbours in NEIGHBOURS:
-            what = f"trying A* with {neighbours} neighbours"
-            yield what, partial(self.try_planner, AStar(neighbours=neighbours))
-        yield "trying a tree", partial(self.try_planner, RRTStar())
-
-    # Searches
-
-    def try_straight_line(self) -> None:
-        self.direct = straight_path(self.problem)
-
-    def try_corners(self) -> None:
-        """The exact shortest path on flat ground."""
-        if (path := shortest_taut_path(self.problem, watch=self.must_stop).path) is not None:
-            self.is_exact = not self.problem.free_space.circles
-            self.refine(path)
-
-    def try_sides(self) -> None:
-        """The shortest path through points on the sides of cost cells; fields show others."""
-        from ..geodesics.cell_routes import shortest_through_cells
-
-        if (path := shortest_through_cells(self.problem, self.must_stop)) is not None:
-            self.is_through_cells = True
-            self.keep_unrefined(path)
-            self.refine(path)
-
-    def try_fields(self) -> None:
-        """The routes of distance fields, on a finer lattice where a coarse one shows none."""
-        for lattice in lattices(self.problem, self.planner.spacing):
-            if self.try_fields_on(lattice, self.planner.routes) or self.stopper.stopped_by:
-                return
-
-    def try_fields_on(self, lattice: Lattice, routes: int) -> bool:
-        """The routes of the distance fields on a lattice; False where they show none."""
-        problem = self.problem
-        self.total = self.samples + 2 * lattice.nx * lattice.ny
-        is_late = self.stopper.is_late
-        medium = Medium(problem.surface, lattice, problem.free_space, is_late)
-        self.fields = march_both(medium, problem.start, problem.goal, watch=self.must_stop)
-        self.samples += sum(round(f.reached * f.values.size) for f in self.fields)
-        if self.stopper.stopped_by and not math.isfinite(self.distance):
-            return False
-        path = self.fields[0].path_to(problem.goal)
-        if path is None:
-            return False
-        self.keep_unrefined(path)
-        if not self.must_stop():
-            self.refine_routes(path, routes)
-        is_close = abs(self.distance - self.best) <= SURE * self.best
-        self.is_sure = self.is_exact or self.is_through_cells or is_close
-        return True
-
-    @property
-    def distance(self) -> float:
-        """What the fields say is the length, map units."""
-        return float(self.fields[0].at(self.problem.goal))
-
-    def try_planner(self, planner: AStar | RRTStar) -> None:
-        """Refine the path of another planner, once."""
-        path = self.search(planner)
-        if path is not None and planner not in self.tried:
-            self.tried.add(planner)
-            self.refine(path)
-
-    def search(self, planner: AStar | RRTStar) -> Path | None:
-        """The path of another planner, which searches once."""
-        if planner in self.searched:
-            return self.searched[planner]
-        solution = planner.solve(
-            self.problem,
-            callback=lambda progress: self.must_stop(progress.samples),
-            time_limit=self.stopper.seconds_left,
-        )
-        self.samples += solution.samples
-        path = self.searched[planner] = solution.path
-        if path is not None:
-            self.keep_unrefined(path)
-        if solution.status is Status.INTERRUPTED:
-            raise KeyboardInterrupt
-        return path
-
-    def try_finer_fields(self) -> None:
-        """Fields on ever finer lattices, where a shorter route could lead."""
-        lattice = self.fields[0].lattice
-        spacing, seconds_per_node = lattice.spacing, 0.0
-        while math.isfinite(self.best) and not self.must_stop():
-            spacing = Spacing(0.5 * spacing.x, 0.5 * spacing.y)
-            lattice, before = Lattice.spanning(self.window(), spacing), self.best
-            nodes, left = lattice.nx * lattice.ny, self.stopper.seconds_left
-            is_late = left is not None and nodes * seconds_per_node > left
-            started = self.stopper.seconds
-            if nodes > MOST_NODES or is_late or not self.try_fields_on(lattice, 1):
-                return
-            if self.is_sure and self.best >= before * (1.0 - GAIN):
-                return
-            seconds_per_node = (self.stopper.seconds - started) / nodes
-
-    def window(self) -> Bounds:
-        """The part of the bounds where a route could be shorter than the best, by the fields."""
-        one, other = self.fields
-        longest = self.best * (1.0 + max(SLACK, 2.0 * abs(self.distance / self.best - 1.0)))
-        near = one.values + other.values <= longest
-        return one.lattice.around(near) if near.any() else self.problem.bounds
-
-    # Routes
-
-    def refine(self, path: Path) -> None:
-        """Refine a candidate and keep it; where that fails, keep it as it is."""
-        rival = self.rival
-        try:
-            path = refine(self.problem, path, must_stop=self.stopper.is_late, rival=rival)
-        except Exception as error:
-            self.failures.append(error)
-        if path.length <= rival:
-            self.keep(path)
-
-    def polish(self) -> None:
-        """Refine the best route again while it gains: on rough ground once is not all."""
-        rounds = MOST_POLISHES if is_rough(self.problem.surface, self.problem.bounds) else 0
-        for _ in range(rounds if self.found else 0):
-            before = self.best
-            if self.stopper.stopped_by or self.stopper.is_late():
-                return
-            self.trying = REFINING
-            self.refine(min(self.found, key=lambda route: route.length))
-            if self.best >= before * (1.0 - GAIN):
-                return
-
-    def refine_routes(self, direct: Path, count: int) -> None:
-        """Refine the routes of the fields; each is kept as soon as it is done."""
-        try:
-            for route in routes_of_fields(
-                self.problem,
-                self.fields,
-                direct,
-                count,
-                only_shorter=True,
-                failed=self.failures.append,
-                must_stop=self.must_stop,
-                is_late=self.stopper.is_late,
-            ):
-                self.keep(route)
-        except Exception as error:
-            self.failures.append(error)
-
-    def keep_unrefined(self, path: Path) -> None:
-        """Keep a path, for what is returned if nothing better comes, where it is the shortest."""
-        if path.length < self.best and self.problem.allows(path):
-            self.direct = path
-
-    def keep(self, route: Path) -> None:
-        """Keep a route unless it touches an obstacle, or is one of those that are known."""
-        if not self.problem.allows(route):
-            return
-        for k, other in enumerate(self.found):
-            if is_same(self.problem, route, other):
-                if route.length < other.length:
-                    self.found[k] = route
-                return
-        self.found.append(route)
-
-    # The answer
-
     def tell_failures(self) -> None:
-        if self.failures:
+        """Say that routes could not be refined."""
+        if failures := self.candidates.failures:
             some = "not every route could be refined"
             none = "no route could be refined; the path is a planner's own"
-            tell_unfinished(some if self.found else none, self.failures[0])
+            tell_unfinished(some if self.candidates.found else none, failures[0])
 
     def directed(self, path: Path) -> Path:
         """A path, from the start that was given."""
@@ -364,7 +119,7 @@ class _Run:
 
     def answer(self) -> Solution:
         """What was found, without a lower bound."""
-        known, direct = self.found, self.direct
+        known, direct = self.candidates.found, self.candidates.direct
         if direct is not None and all(route.length > direct.length for route in known):
             known, direct = [direct, *known], None  # it could not be refined, or not yet
         routes = [self.directed(route) for route in shortest(known, self.planner.routes)]
@@ -376,7 +131,7 @@ class _Run:
             path=path,
             cost=None if path is None else path.length,
             seconds=self.stopper.seconds,
-            samples=self.samples,
+            samples=self.candidates.samples,
             stopped_by=self.stopper.stopped_by or "no path between the nodes",
             unrefined=None if direct is None else self.directed(direct),
             alternatives=tuple(routes[1:]),
@@ -390,7 +145,7 @@ class _Run:
         target = self.planner.target_gap
         solution = with_bound(
             solution,
-            target_gap=None if self.is_exact else target,
+            target_gap=None if self.candidates.is_exact else target,
             time_limit=self.stopper.seconds_left,
             callback=self.stopper.must_stop,
         )
@@ -405,4 +160,4 @@ class _Run:
             return "gap met"
         if self.stopper.stopped_by:
             return self.stopper.stopped_by
-        return "exact on flat ground" if self.is_exact else "finest lattice"
+        return "exact on flat ground" if self.candidates.is_exact else "finest lattice"

@@ -45,8 +45,8 @@ SHRINKS, GROWS, STAYS = 0.25, 1.5, 0.4
 FARTHEST, PART = 8.0, 0.3
 
 # A stage gains about a quarter to a half of what the one before gained, so all that follow gain no
-# more than this many times what it did, and a little.
-HOPE = 1.5
+# more than this many times what it did, and a little: a share for each feature between points.
+HOPE, MORE = 1.5, 0.02
 # A share of the length that is worth a word.
 MUCH = 0.01
 
@@ -107,7 +107,7 @@ def shortened(
             break
         stage = _Stage(ground, finer, spacing)
         points = stage.settled(least_gain, must_stop)
-        if stage.length * (1.0 - HOPE * stage.gain - MUCH) > rival:
+        if stage.length * (1.0 - HOPE * stage.gain - MORE * spacing) > rival:
             return Shortened(given, math.inf, is_hopeless=True)
         # Halved spacings gain a quarter of what those before gained.
         remains = max(stage.gain / 3.0, ground.gain_by_bending(points))
