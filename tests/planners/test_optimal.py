@@ -119,12 +119,12 @@ BESIDE_A_DISC = tp.Problem(
 def raising(monkeypatch):
     """Makes the refinement of these candidates, counted from 1, raise an error."""
 
-    def patch(error, *candidates):
+    def patch(error, *numbers):
         refine, calls = alternatives.refine, []
 
         def refine_or_raise(problem, path, **limits):
             calls.append(path)
-            if len(calls) in candidates:
+            if len(calls) in numbers:
                 raise error
             return refine(problem, path, **limits)
 

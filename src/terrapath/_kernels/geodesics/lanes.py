@@ -67,7 +67,7 @@ def pair(surface, x, y, vx, vy, share):
 
 @kernel
 def gauss_length(surface, frame, ax, ay, bx, by):
-    """The length of a segment by Gauss's rule of five points, in equal panels; of three if short."""
+    """The length of a segment by Gauss's rule: five points in each panel, or three in all."""
     across = max(abs(bx - ax) / frame.longest_x, abs(by - ay) / frame.longest_y)
     if across <= SHORT:
         return gauss(surface, ax, ay, bx - ax, by - ay)
