@@ -135,7 +135,7 @@ class FlowSearch:
         self._note()
         kernels.choose_diagonals(coarser.u, coarser._ratio, coarser.rising)
         kernels.refine(coarser.u, coarser.flow, coarser.rising, u[1], self.flow)
-        return u[1]
+        return np.asarray(u[1])
 
     def _between_fields(self, length: float) -> Array:
         """Half the distance from the start minus half that to the goal, at the nodes."""
