@@ -18,6 +18,7 @@ from terrapath.certificates.claims import Claim, Core, cell_needs
 from terrapath.certificates.multigrid import Multigrid
 from terrapath.errors import CertificateError
 from terrapath.space.lattice import Lattice
+from terrapath.surface import Mask
 from terrapath.surface.bounds import Bounds
 
 
@@ -29,6 +30,13 @@ def problem_of(seed, count=24, steep=0.0, **options):
         tp.Problem(cell_surface(costs, heights), (12.0, 17.0), (top - 14.0, top - 21.0), **options),
         Walker(costs, heights, axis, axis),
     )
+
+
+def blocked_cells(rows=slice(None), columns=slice(None)):
+    """Cells of a grid of 20 x 20 that may not be entered."""
+    axis, blocked = 10.0 * np.arange(20), np.zeros((20, 20), bool)
+    blocked[rows, columns] = True
+    return Mask(blocked, axis, axis)
 
 
 def interpolated(values, s, t):
@@ -154,28 +162,64 @@ def test_bounds_that_cut_cells_and_obstacles_are_proven_with():
 
 
 def shunned(**options):
-    """Cheap cells behind a side at x = 145 that a path may touch, but not cross."""
+    """Cheap cells behind a side at x = 145."""
     costs = np.full((20, 20), 50.0)
     costs[:, 15] = 1.0
     return tp.Problem(cell_surface(costs), (100.0, 20.0), (100.0, 150.0), **options)
+
+
+def path_along(problem, x):
+    return problem.path([(100.0, 20.0), (x, 20.0), (x, 150.0), (100.0, 150.0)])
+
+
+BESIDE = 145.0 - 1e-7
 
 
 @pytest.mark.parametrize(
     ("options", "x"),
     [
         ({"bounds": (40.0, 0.0, 145.0, 190.0)}, 145.0),
-        ({"bounds": (40.0, 0.0, 145.0 - 1e-7, 190.0)}, 145.0 - 1e-7),
-        ({"obstacles": [shapely.box(145.0, -10.0, 155.0, 200.0)]}, 145.0 - 1e-7),
+        ({"bounds": (40.0, 0.0, BESIDE, 190.0)}, BESIDE),
+        ({"obstacles": [shapely.box(145.0, -10.0, 155.0, 200.0)]}, BESIDE),
+        ({"obstacles": [blocked_cells(columns=[15])]}, BESIDE),
     ],
 )
-def test_bounds_hold_for_paths_along_the_edge_of_free_space(options, x):
+def test_cells_that_cannot_be_entered_lend_no_cost_to_their_sides(options, x):
     problem = shunned(**options)
-    path = problem.path([(100.0, 20.0), (x, 20.0), (x, 150.0), (100.0, 150.0)])
+    path = path_along(problem, x)
+    assert problem.allows(path)
+    assert path.length == pytest.approx(50.0 * (45.0 + 130.0 + 45.0), rel=1e-6)
+    straight = 50.0 * 130.0
+    bound = tp.lower_bound(problem, length=straight, target_gap=1e-3)
+    bound.check(problem)
+    assert 0.999 * straight <= bound.value <= straight * (1.0 + 1e-9)
+    # What was given stays, and another problem on that surface has it.
+    again = shunned()
+    opened = tp.Problem(problem.surface, again.start, again.goal)
+    assert path_along(opened, x).length == path_along(again, x).length < 5000.0
+
+
+def test_bounds_hold_for_paths_along_cells_that_lend_their_cost():
+    # A part of each cheap cell is open, behind the obstacle.
+    problem = shunned(obstacles=[shapely.box(145.0, -10.0, 154.0, 200.0)])
+    path = path_along(problem, BESIDE)
     assert problem.allows(path)
     bound = tp.lower_bound(problem, length=6500.0)
     bound.check(problem)
-    assert bound.value <= path.length * (1.0 + 1e-9)
-    assert bound.value >= 0.9 * path.length
+    assert 0.9 * path.length <= bound.value <= path.length * (1.0 + 1e-9)
+
+
+def test_no_data_lends_no_cost_and_is_no_bridge():
+    # Two columns without a cost between dear ground and a cheap lane; a ford far up.
+    costs = np.full((30, 30), 50.0)
+    costs[:, 17], costs[:, 15:17], costs[25:28, 15:17] = 1.0, math.nan, 20.0
+    problem = tp.Problem(cell_surface(costs), (20.0, 50.0), (130.0, 230.0))
+    along = problem.path([(144.9, 50.0), (144.9, 230.0)])
+    assert along.length == pytest.approx(50.0 * 180.0)
+    straight = 50.0 * math.hypot(110.0, 180.0)
+    bound = tp.lower_bound(problem, length=straight, target_gap=1e-3)
+    bound.check(problem)
+    assert 0.999 * straight <= bound.value <= straight * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("beside", [1e-8, 0.9e-7, 1.5e-7])

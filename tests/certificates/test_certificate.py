@@ -86,6 +86,7 @@ def test_the_checker_shares_nothing_with_the_solver():
         "_kernels.surface.cells",
         "_kernels.surface.surfaces",
         "errors",
+        "space.free_space",
         "space.lattice",
         "surface.bounds",
         "validation",

@@ -26,7 +26,7 @@ from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
 from ..surface.layers import span_within
 from ..validation import Array, Point
-from .sides import margins_at_ends, not_even_touched, require_fit
+from .sides import margins_at_ends, matter_not, require_fit
 
 # A relative margin, far above the rounding errors of the checker, far below any gap.
 ROUNDING = 1e-9
@@ -197,9 +197,9 @@ def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
 
 def exempt_cells(problem: Problem, claim: Claim) -> Cells:
     """Cells (ny, nx) that no path meets between its cores, or at all where u is linear."""
-    exempt = problem.free_space.covered_cells(claim.lattice)
     if is_linear(problem):
-        return not_even_touched(exempt)
+        return matter_not(problem.surface.data, claim.lattice, problem.free_space)
+    exempt = problem.free_space.covered_cells(claim.lattice)
     for core in (claim.start_core, claim.goal_core):
         exempt[core.row0 : core.row1, core.column0 : core.column1] = True
     return exempt

@@ -26,7 +26,7 @@ from ..validation import Array, Point
 from .certificate import Certificate, certify
 from .claims import Claim, Core, cell_needs
 from .multigrid import Multigrid
-from .sides import not_even_touched
+from .sides import costs_of, matter_not
 
 # The first lattice has two of its cells on a side of a cell of constant cost, where that makes no
 # more nodes than this; else one, or less, for the second number. Finer ones have up to the third.
@@ -160,8 +160,7 @@ class FlowSearch:
         lattice, surface = self.lattice, self.problem.surface
         assert isinstance(surface.data, Spline)
         assert surface.bounds is not None
-        costs = np.empty((lattice.ny - 1, lattice.nx - 1))
-        kernels.fill_least_costs(surface.data.cells, lattice.data, costs)
+        costs = costs_of(surface.data, lattice)
         low, high = np.array(surface.bounds[:2]), np.array(surface.bounds[2:])
         middles = [0.5 * (at[1:] + at[:-1]) for at in (lattice.x, lattice.y)]
         centres = np.clip(np.stack(np.meshgrid(*middles), axis=-1), low, high)
@@ -171,7 +170,7 @@ class FlowSearch:
         unit = math.sqrt(lattice.dx * lattice.dy)
         inverse *= unit * unit / np.outer(lattice.spacing, lattice.spacing)
         costs *= smooth * unit
-        costs[not_even_touched(self.problem.free_space.covered_cells(lattice))] = FREE
+        costs[matter_not(surface.data, lattice, self.problem.free_space)] = FREE
         return costs, _roots(inverse)
 
     def _note(self) -> None:

@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .._kernels.certificates.potentials import Potential, linear_value
-from .._kernels.surface.cells import ON_SIDE
+from .._kernels.surface.cells import ON_SIDE, fill_least_costs
 from .._kernels.surface.surfaces import Peaks, Spline
 from ..errors import CertificateError
+from ..space.free_space import FreeSpace
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
 from ..validation import Array
@@ -21,6 +22,8 @@ from ..validation import Array
 # A line lies on a side if it is this near to it, in cells, besides the rounding of coordinates.
 NEAR = 1e-9
 EPSILONS = 16.0 * float(np.finfo(np.float64).eps)
+
+Cells = npt.NDArray[np.bool_]
 
 
 def off_sides(surface: Peaks | Spline, lattice: Lattice) -> float:
@@ -61,15 +64,25 @@ def require_fit(surface: Peaks | Spline, lattice: Lattice, bounds: Bounds) -> No
         )
 
 
-def not_even_touched(covered: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Which covered cells (ny, nx) have only covered ones around them.
+def costs_of(surface: Peaks | Spline, lattice: Lattice) -> Array:
+    """The least costs inside the cells (ny - 1, nx - 1) of a lattice."""
+    assert isinstance(surface, Spline)
+    costs = np.empty((lattice.ny - 1, lattice.nx - 1))
+    fill_least_costs(surface.cells, lattice.data, costs)
+    return costs
 
-    A path may run along the others, on their sides, and has their costs there.
+
+def matter_not(surface: Peaks | Spline, lattice: Lattice, space: FreeSpace) -> Cells:
+    """Which cells of a lattice (ny - 1, nx - 1) no path can enter, nor have the costs of.
+
+    A path may run along the side of a cell that is covered by an obstacle. Where that is cheaper
+    than one of the open cells around, the path has its cost.
     """
-    around = np.pad(covered, 1, constant_values=True)
+    covered, costs = space.covered_cells(lattice, on_sides=True), costs_of(surface, lattice)
     rows, columns = covered.shape
+    around = np.pad(np.where(covered, 0.0, costs), 1)
     shifts = [around[j : j + rows, i : i + columns] for j in range(3) for i in range(3)]
-    return np.asarray(np.logical_and.reduce(shifts))
+    return np.asarray(covered & (costs >= np.maximum.reduce(shifts)))
 
 
 def margins_at_ends(

@@ -52,7 +52,8 @@ class Problem:
     reports.
     show : how messages write a place (x1, x2), as in the user's own coordinates.
 
-    ``obstacles`` are those given; ``free_space`` is where the vehicle's centre may be.
+    ``obstacles`` are those given; ``free_space`` is where the vehicle's centre may be. In
+    ``surface`` cells of a cost raster that cannot be entered lend no lower cost to their sides.
     Raises OutsideSurfaceError, BlockedError or InputError, naming the value and the remedy.
     """
 
@@ -93,6 +94,10 @@ class Problem:
         self.keep_in = keep_in
         self.pricing = None if travel is None else self._priced(travel)
         self.free_space = self._free_space()
+        if surface.cost_cells is not None:
+            from .closed_cells import without_loans
+
+            self.surface = without_loans(surface, self.free_space)
         self.start = self.checked(start, "start")
         self.goal = self.start if goal is start else self.checked(goal, "goal")
 

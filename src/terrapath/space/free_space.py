@@ -260,11 +260,16 @@ class FreeSpace:
         inside = bool(self.bounds.contains(points).all())
         return inside and bool(self.segments_are_free(points[:-1], points[1:]).all())
 
-    def covered_cells(self, lattice: Lattice) -> npt.NDArray[np.bool_]:
-        """(ny - 1, nx - 1), which cells of a lattice surely lie wholly inside one obstacle."""
+    def covered_cells(self, lattice: Lattice, *, on_sides: bool = False) -> npt.NDArray[np.bool_]:
+        """(ny - 1, nx - 1), which cells of a lattice surely lie wholly inside one obstacle.
+
+        on_sides : those of a mask, too, that end on sides of its blocked cells. As these are
+        widened a little, no path meets even the sides.
+        """
         covered = np.zeros((lattice.ny - 1, lattice.nx - 1), bool)
+        slack = -0.5 * CELL_MARGIN if on_sides else 1e-9
         for mask in self.masks:
-            covered |= _covered_by_mask(mask, lattice)
+            covered |= _covered_by_mask(mask, lattice, slack)
         large = self._geometries[_may_cover(self._geometries, lattice)]
         patches = [_covered_by_geometry(geometry, lattice) for geometry in large]
         patches += [_covered_by_disc(circle, lattice) for circle in self.circles]
@@ -314,11 +319,11 @@ def _covered_by_disc(circle: Circle, lattice: Lattice) -> _Patch:
     return window, np.asarray(np.hypot(reach[..., 0], reach[..., 1]) <= r * (1.0 - 1e-12))
 
 
-def _covered_by_mask(mask: Mask, lattice: Lattice) -> npt.NDArray[np.bool_]:
-    """Cells all of whose ground is blocked by the mask."""
+def _covered_by_mask(mask: Mask, lattice: Lattice, slack: float) -> npt.NDArray[np.bool_]:
+    """Cells all of whose ground, and so much more on all sides, is blocked by the mask."""
     dx, dy = mask.spacing
-    columns = _mask_spans(lattice.x, mask.x[0] - 0.5 * dx, dx, len(mask.x))
-    rows = _mask_spans(lattice.y, mask.y[0] - 0.5 * dy, dy, len(mask.y))
+    columns = _mask_spans(lattice.x, mask.x[0] - 0.5 * dx, dx, len(mask.x), slack)
+    rows = _mask_spans(lattice.y, mask.y[0] - 0.5 * dy, dy, len(mask.y), slack)
     sums = np.zeros((len(mask.y) + 1, len(mask.x) + 1), np.int64)
     sums[1:, 1:] = mask.blocked.cumsum(0).cumsum(1)
     (j0, j1, in_rows), (i0, i1, in_columns) = rows, columns
@@ -328,11 +333,14 @@ def _covered_by_mask(mask: Mask, lattice: Lattice) -> npt.NDArray[np.bool_]:
 
 
 def _mask_spans(
-    nodes: Array, origin: float, step: float, count: int
+    nodes: Array, origin: float, step: float, count: int, slack: float
 ) -> tuple[Indices, Indices, npt.NDArray[np.bool_]]:
-    """For each cell of an axis: the first mask cell it touches, one past the last, is it within?"""
-    first = np.floor((nodes[:-1] - origin) / step - 1e-9).astype(np.int64)
-    last = np.ceil((nodes[1:] - origin) / step + 1e-9).astype(np.int64)
+    """For each cell of an axis: the first mask cell it meets, one past the last, is it within?
+
+    slack : what is added to the cell at both ends, in cells of the mask.
+    """
+    first = np.floor((nodes[:-1] - origin) / step - slack).astype(np.int64)
+    last = np.ceil((nodes[1:] - origin) / step + slack).astype(np.int64)
     return np.clip(first, 0, count), np.clip(last, 0, count), (first >= 0) & (last <= count)
 
 

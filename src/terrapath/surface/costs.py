@@ -117,6 +117,21 @@ def cost_values_at(
     return values
 
 
+def with_closed_cells(surface: Surface, closed: npt.NDArray[np.bool_]) -> Surface:
+    """A surface whose closed cells (ny, nx), which no path can enter, cost as the dearest of all.
+
+    So they lend no lower cost to their sides. Cells that were closed before are opened again, and
+    ``cost_cells`` stays what was given.
+    """
+    assert isinstance(surface.data, Spline)
+    cells = cost_cells(surface.cost_cells, surface.costs)
+    costs = np.where(closed, cells.costs.max(), cells.costs)
+    if np.array_equal(costs, surface.data.cells.costs):
+        return surface
+    cells = cells._replace(costs=costs, least=float(costs.min()))
+    return replace(surface, data=with_costs(surface.data, surface.cost_data, cells))
+
+
 def with_cells(surface: Surface, cells: CellLayers) -> Surface:
     """A surface with other values for its cost layers that are constant in cells."""
     assert isinstance(surface.data, Spline)

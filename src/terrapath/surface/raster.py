@@ -320,7 +320,8 @@ class Raster:
         for band, kind, missing in zip(self.bands, kinds, gaps, strict=True):
             if not missing.any():
                 continue
-            known = band[~missing] if kind == "cells" else None
+            given = ~missing
+            known = band[given] if kind == "cells" else None
             if kind != "rise":
                 np.log(band, out=band)
             low, high = np.nanmin(band), np.nanmax(band)
@@ -331,7 +332,9 @@ class Raster:
             if kind != "rise":
                 np.exp(np.clip(band, low, high, out=band), out=band)
             if known is not None:
-                band[~missing] = known
+                band[given] = known
+                # What is still missing is blocked, and must lend no low cost to its neighbours.
+                band[missing] = known.max()
         return np.logical_or.reduce(gaps), gaps[0]
 
     def to_surface(

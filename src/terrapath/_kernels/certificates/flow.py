@@ -8,7 +8,6 @@ two as in ``potentials.py``; here slopes are per side of a lattice cell.
 import math
 
 from ..compiler import inner_kernel, kernel
-from ..surface.cells import least_inside
 from .potentials import slope_of
 
 
@@ -108,13 +107,3 @@ def refine(u, flow, rising, finer_u, finer_flow):
                 finer_u[j, i] = 0.5 * (u[a, b + 1] + u[a + 1, b])
             else:
                 finer_u[j, i] = 0.5 * (u[a, b] + u[a + down, b + east])
-
-
-@kernel
-def fill_least_costs(cells, grid, costs):
-    """The least cost of the cells that hold a part of each cell of a lattice (ny - 1, nx - 1)."""
-    for j in range(costs.shape[0]):
-        y = grid.y0 + j * grid.dy
-        for i in range(costs.shape[1]):
-            x = grid.x0 + i * grid.dx
-            costs[j, i] = least_inside(cells, x, x + grid.dx, y, y + grid.dy)

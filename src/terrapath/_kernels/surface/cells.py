@@ -140,6 +140,16 @@ def least_inside(cells, x0, x1, y0, y1):
     return found
 
 
+@kernel
+def fill_least_costs(cells, grid, costs):
+    """The least cost of the cells that hold a part of each cell of a lattice (ny - 1, nx - 1)."""
+    for j in range(costs.shape[0]):
+        y = grid.y0 + j * grid.dy
+        for i in range(costs.shape[1]):
+            x = grid.x0 + i * grid.dx
+            costs[j, i] = least_inside(cells, x, x + grid.dx, y, y + grid.dy)
+
+
 class Range(NamedTuple):
     """The lowest and the highest cost of some cells."""
 
