@@ -211,9 +211,11 @@ def test_bounds_hold_for_paths_along_cells_that_lend_their_cost():
 
 def test_no_data_lends_no_cost_and_is_no_bridge():
     # Two columns without a cost between dear ground and a cheap lane; a ford far up.
-    costs = np.full((30, 30), 50.0)
+    axis, costs = CELL * np.arange(30), np.full((30, 30), 50.0)
     costs[:, 17], costs[:, 15:17], costs[25:28, 15:17] = 1.0, math.nan, 20.0
-    problem = tp.Problem(cell_surface(costs), (20.0, 50.0), (130.0, 230.0))
+    layer = (costs, axis, axis)
+    surface = tp.read_surface((np.zeros_like(costs), axis, axis), costs={"going": layer})
+    problem = tp.Problem(surface, (20.0, 50.0), (130.0, 230.0))
     along = problem.path([(144.9, 50.0), (144.9, 230.0)])
     assert along.length == pytest.approx(50.0 * 180.0)
     straight = 50.0 * math.hypot(110.0, 180.0)
