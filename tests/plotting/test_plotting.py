@@ -18,6 +18,7 @@ from matplotlib.image import imread
 
 import terrapath as tp
 from common import made_up
+from cost_rasters import cell_surface
 from terrapath.plotting import (
     draw_field,
     draw_page,
@@ -97,6 +98,30 @@ def test_heights_and_contours_of_a_further_layer_are_named():
     assert "height" in [text.get_text() for text in perspective.texts]
     shown = [text.get_text() for text in plane.get_legend().get_texts()]
     assert "contours: resistance" in shown
+
+
+@pytest.mark.parametrize("is_flat", [True, False])
+def test_costs_have_their_colours_and_a_scale_of_their_own(is_flat):
+    # A river of 200 and, where the map is masked, a cost that no route can have.
+    costs = np.full((20, 20), 2.0)
+    costs[:, 9:11], costs[:, 0] = 200.0, 5000.0
+    heights = np.zeros((20, 20)) if is_flat else np.add.outer(np.arange(20.0), np.zeros(20))
+    blocked = np.zeros((20, 20), bool)
+    blocked[:, 0] = True
+    axis = 10.0 * np.arange(20)
+    surface = cell_surface(costs, heights)
+    problem = tp.Problem(surface, (30, 40), (160, 150), obstacles=[tp.Mask(blocked, axis, axis)])
+    plane, *others = draw_route(tp.AStar().solve(problem)).axes
+    (scale,) = (axes for axes in others if axes.get_ylabel() == "cost: going")
+    assert [text.get_text() for text in scale.get_yticklabels()] == ["2", "200"]
+    assert scale.get_yscale() == "log"
+    shown = plane.images[0].get_array()
+    river, ground = shown[250, 250], shown[250, 400]
+    assert ground.sum() > river.sum() + 0.5
+    names = [text.get_text() for text in plane.get_legend().get_texts()]
+    assert ("contours: height" in names) is not is_flat
+    field = draw_field(tp.distance_field(surface, (30, 40)))
+    assert "cost: going" in [axes.get_ylabel() for axes in field.axes]
 
 
 @pytest.mark.parametrize("turns", range(4))

@@ -13,7 +13,7 @@ from ..problem import Problem
 from ..surface.ground import quantity, value_unit
 from ..validation import Array
 from .labels import AxisUnit
-from .map_view import draw_ground, draw_start
+from .map_view import draw_ground, draw_scale, draw_start
 
 LINES = 24
 LINE_COLOURS = "plasma"
@@ -60,7 +60,9 @@ def _hatch(axes: Any, field: DistanceField) -> None:
 def draw_distances(axes: Any, field: DistanceField) -> None:
     """Draw a field on two-dimensional axes; regions that were not reached are hatched."""
     problem = _as_problem(field)
-    draw_ground(axes, problem, PALE, contours=False)
+    terrain = draw_ground(axes, problem, PALE, contours=False)
+    if terrain.costs is not None:
+        draw_scale(axes, terrain)
     values = np.ma.masked_invalid(field.values)
     _hatch(axes, field)
     if values.count() and values.max() > 0.0:

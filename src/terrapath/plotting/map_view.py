@@ -17,7 +17,7 @@ from shapely import LineString, Point, Polygon
 from ..problem import Problem, Solution
 from ..space.free_space import Parts, sort_obstacles
 from .labels import format_length, label_axes, straight_name
-from .terrain import LAYER_COLOURS, Cells, Terrain, height_colours
+from .terrain import COST_COLOURS, LAYER_COLOURS, Cells, Terrain, height_colours
 
 SAMPLES = 500
 CONTOURS = 14
@@ -124,6 +124,8 @@ def _draw_contours(axes: Any, terrain: Terrain) -> None:
     if np.ptp(heights) > 0.0:
         style = {"colors": "black", "linewidths": 0.45, "alpha": 0.45, "linestyles": "solid"}
         axes.contour(terrain.x, terrain.y, heights, CONTOURS, **style)
+        if terrain.costs is not None:
+            axes.plot([], [], color="black", lw=0.8, label=f"contours: {terrain.label(0)}")
     if others and np.ptp(others[0]) > 0.0:
         from scipy.ndimage import gaussian_filter
 
@@ -195,10 +197,16 @@ def draw_ground(
     contours: bool = True,
     area: str = KEEP_IN,
 ) -> Terrain:
-    """Draw the region without a route: shaded ground, contours, obstacles, limits and labels."""
+    """Draw the region without a route: shaded ground, contours, obstacles, limits and labels.
+
+    The ground is coloured by its height, or by what it costs where there are cost layers.
+    """
     terrain = Terrain.sample(problem, SAMPLES)
-    style = {"extent": _extent(problem), "origin": "lower", "interpolation": "bilinear"}
-    axes.imshow(terrain.shaded(0), alpha=opacity, **style)
+    has_costs = terrain.costs is not None
+    shown = terrain.shaded_costs() if has_costs else terrain.shaded(0)
+    style = {"extent": _extent(problem), "origin": "lower"}
+    style["interpolation"] = "nearest" if has_costs else "bilinear"
+    axes.imshow(shown, alpha=opacity, **style)
     if contours:
         _draw_contours(axes, terrain)
     draw_obstacles(axes, problem, terrain, area)
@@ -232,5 +240,18 @@ def draw_map(axes: Any, solution: Solution) -> None:
     _draw_tree(axes, solution)
     _draw_path(axes, solution)
     axes.legend(loc=_emptiest_corner(solution), fontsize=8, framealpha=0.85)
-    colours = ScalarMappable(terrain.norm(0), height_colours())
-    axes.figure.colorbar(colours, ax=axes, label=terrain.label(0), shrink=0.72, pad=0.02)
+    draw_scale(axes, terrain)
+
+
+def draw_scale(axes: Any, terrain: Terrain) -> None:
+    """Draw what the ground's colours mean: heights, or costs where there are cost layers."""
+    where = {"ax": axes, "shrink": 0.72, "pad": 0.02}
+    if terrain.costs is None:
+        colours = ScalarMappable(terrain.norm(0), height_colours())
+        axes.figure.colorbar(colours, label=terrain.label(0), **where)
+        return
+    colours = ScalarMappable(terrain.cost_norm, colormaps[COST_COLOURS])
+    bar = axes.figure.colorbar(colours, label=terrain.cost_label, **where)
+    if (few := terrain.few_costs) is not None:
+        bar.set_ticks(few, labels=[f"{cost:.6g}" for cost in few])
+        bar.minorticks_off()

@@ -97,11 +97,16 @@ def _draw_path(axes: Any, solution: Solution, terrain: Terrain, box: Array, spre
 
 
 def draw_perspective(axes: Any, solution: Solution) -> None:
-    """Draw the surface on 3-D axes, coloured by the second layer where there is one."""
+    """Draw the surface on 3-D axes, coloured by the second layer where there is one.
+
+    Flat ground with cost layers is coloured by its costs.
+    """
     problem = solution.problem
     terrain = Terrain.sample(problem, SAMPLES)
     layer = 1 if len(terrain.values) > 1 else 0
-    colours = terrain.shaded(layer)
+    is_flat = layer == 0 and not np.ptp(terrain.values[0])
+    by_cost = is_flat and terrain.costs is not None
+    colours = terrain.shaded_costs() if by_cost else terrain.shaded(layer)
     _tint(colours, terrain.blocked, MARGIN_COLOUR)
     _tint(colours, terrain.steep, STEEP_COLOUR)
     _tint(colours, terrain.solid, OBSTACLE_COLOUR)

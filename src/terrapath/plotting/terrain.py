@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import shapely
 from matplotlib import colormaps
-from matplotlib.colors import LightSource, Normalize
+from matplotlib.colors import LightSource, LogNorm, Normalize
 from shapely.geometry.base import BaseGeometry
 
 from ..problem import Problem
@@ -19,12 +19,18 @@ from ..space.free_space import Circle, Geometries, sort_obstacles
 from ..surface import Mask
 from ..surface.neighbours import bilinear
 from ..validation import Array
-from .labels import with_unit
+from .labels import in_words, with_unit
 
 Cells: TypeAlias = npt.NDArray[np.bool_]
 
 HEIGHT_COLOURS = "gist_earth"
 LAYER_COLOURS = "plasma"
+# Cheap ground is light, and dear ground dark. Costs with a wider range have a logarithmic scale;
+# of few costs each is named.
+COST_COLOURS = "YlGnBu"
+WIDE_RANGE, FEW_COSTS = 8.0, 7
+# Hill shade changes colours; of costs it must not hide which is which.
+COST_SHADE = 0.4
 # The surface is shaded as if its range of heights were this share of its extent, so that the
 # relief is visible on flat and on steep ground.
 SHADED_RELIEF = 0.12
@@ -140,6 +146,10 @@ class Terrain:
         if layer == 0:  # leave out the blue and the white end of the colour map
             fraction = 0.22 + 0.68 * np.asarray(fraction)
         colours = colormaps[name](fraction)[..., :3]
+        return self._lit(colours)
+
+    def _lit(self, colours: Array) -> Array:
+        """Colours (ny, nx, 3) in the hill shade of the first layer."""
         height = self.values[0]
         extent = max(self.problem.bounds.width, self.problem.bounds.height)
         spread = float(np.ptp(height)) or 1.0
@@ -152,6 +162,48 @@ class Terrain:
             dy=-float(self.y[1] - self.y[0]),
         )
         return np.clip(np.asarray(lit, np.float64), 0.0, 1.0)
+
+    @cached_property
+    def costs(self) -> Array | None:
+        """(ny, nx): the product of all cost layers; None where there are none."""
+        if not self.problem.surface.costs:
+            return None
+        return self.problem.surface.cost(np.stack(np.meshgrid(self.x, self.y), axis=-1))
+
+    @property
+    def cost_label(self) -> str:
+        """The names of the cost layers, with their weights."""
+        named = [
+            in_words(cost.name) + (f"^{cost.weight:g}" if cost.weight != 1.0 else "")
+            for cost in self.problem.surface.costs
+        ]
+        return f"cost: {' x '.join(named)}"
+
+    @cached_property
+    def cost_norm(self) -> Normalize:
+        """The colour scale of costs, from the part of the region that is not blocked."""
+        shown = self._open_costs
+        low, high = float(shown.min()), float(shown.max())
+        norm = LogNorm if high > WIDE_RANGE * low else Normalize
+        return norm(low, high if high > low else 2.0 * low)
+
+    @property
+    def few_costs(self) -> list[float] | None:
+        """All costs, where they are few."""
+        different = np.unique(self._open_costs)
+        return different.tolist() if len(different) <= FEW_COSTS else None
+
+    @property
+    def _open_costs(self) -> Array:
+        assert self.costs is not None
+        return self.costs[~self.masked if not self.masked.all() else ...]
+
+    def shaded_costs(self) -> Array:
+        """(ny, nx, 3): the colours of costs, with some of the hill shade of the first layer."""
+        assert self.costs is not None
+        fraction = np.clip(np.asarray(self.cost_norm(self.costs)), 0.0, 1.0)
+        colours = colormaps[COST_COLOURS](fraction)[..., :3]
+        return np.asarray((1.0 - COST_SHADE) * colours + COST_SHADE * self._lit(colours))
 
 
 def height_colours() -> Any:
