@@ -47,6 +47,7 @@ def test_a_map_of_nav2_is_flat_ground_with_its_walls_blocked(tmp_path, name):
     door = np.array([-2.0 + 0.5 * 14.5, 3.0 + 0.5 * 16.5])  # the fourth row from the north
     assert np.hypot(*(path.points - door).T).min() < 0.5
     assert path.length == pytest.approx(np.hypot(*(path.points[1:] - path.points[:-1]).T).sum())
+    assert (surface.unit, problem.unit, path.ground_unit) == ("m", "m", "m")
     for blocked in ([5.25, 4.0], [11.9, 3.4]):  # the wall, and what is unknown
         with pytest.raises(tp.BlockedError):
             tp.Problem(surface, (-1.9, 3.1), blocked)

@@ -51,6 +51,11 @@ def test_without_a_free_place_there_is_none():
         tp.Problem(FLAT, (3, 4), (5, 5), BOUNDS, [shapely.box(-1, -1, 21, 21)])
 
 
+def test_a_vehicle_wider_than_the_map_is_told_to_be_narrower():
+    with pytest.raises(tp.BlockedError, match=r"radius=100 .*is free; give a smaller radius$"):
+        tp.Problem(FLAT, (3, 4), (5, 5), BOUNDS, [shapely.box(8, 8, 9, 9)], radius=100.0)
+
+
 WALL = shapely.box(4, 4, 9, 16)
 
 

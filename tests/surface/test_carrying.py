@@ -6,7 +6,7 @@ import rasterio
 from rasterio import Affine
 
 import terrapath as tp
-from common import REAL_MAPS
+from common import REAL_MAPS, one_line
 from rasters import blocked_at, centres_on_plane, write
 from rough_maps import fractal
 from terrapath.space.lattice import Spacing, default_spacing
@@ -163,3 +163,11 @@ def test_beside_a_pole_places_are_still_right(tmp_path):
     heights = rough(11, (100, 120))
     surface = tp.read_surface(write(tmp_path / "pole.tif", heights, transform, "EPSG:4326"))
     check_heights(surface, heights, transform, 0.5, 5.0)
+
+
+def test_cells_without_a_size_on_the_plane_are_refused_in_one_line(tmp_path):
+    transform = Affine(-1e-310, 0.0, 500_000.0, 0.0, -10.0, 4_000_120.0)
+    path = write(tmp_path / "thin.tif", rough(12, (14, 12)), transform, "EPSG:32633")
+    with pytest.raises(tp.MapError, match="its cells have no size; check its CRS") as caught:
+        tp.read_surface(path)
+    one_line(caught)

@@ -116,8 +116,18 @@ class Certificate(Claim):
         except FileNotFoundError:
             raise MapError(f"{path} does not exist; check the path") from None
         except Exception as error:  # for other files zip, zlib and NumPy raise errors of many kinds
-            reason = " ".join(str(error).split()) or type(error).__name__
-            raise MapError(f"{path} is not a certificate: {reason:.200}") from None
+            raise MapError(
+                f"{path} is not a certificate, or is damaged: {_what_is_wrong(error)}; give a file "
+                "that `plan --certificate` wrote"
+            ) from None
+
+
+def _what_is_wrong(error: Exception) -> str:
+    """What of a file cannot be read. NumPy's advice to trust a file is none of ours."""
+    reason = " ".join(str(error).split())
+    if "pickle" in reason:
+        return "it holds no plain arrays"
+    return f"{reason:.200}" or type(error).__name__
 
 
 def fingerprint(problem: Problem) -> str:

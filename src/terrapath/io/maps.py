@@ -107,7 +107,8 @@ class OpenMap:
             from ..surface.costs import with_cells
 
             surface = with_cells(surface, cells)
-        return replace(surface, source=self.heights.band.label)
+        band = self.heights.band
+        return replace(surface, source=band.label, unit_of_axes=band.unit_of_axes)
 
     def _view(self, within: Rectangle | None, margin: float = 0.0, decimate: int = 1) -> View:
         """The part of the heights to read."""

@@ -26,15 +26,22 @@ MOST_BYTES = 1_000_000  # of a description
 FARTHEST_TURN = 1e3  # radians; beyond that nothing is precise
 MODES = ("trinary", "scale", "raw")
 OCCUPIED = 100.0
+METRE = "m"  # what resolutions and origins of nav2 are in
 PASSABLE = b".GS"  # ground and shallow water, in maps of MovingAI
 
 
 def occupancy_band(
-    path: Path, number: int | str, occupancy: Array, blocked: Cells, transform: Affine
+    path: Path,
+    number: int | str,
+    occupancy: Array,
+    blocked: Cells,
+    transform: Affine,
+    unit: str = "",
 ) -> Band:
     """Band 1, flat ground, or band 2, the cost 1 + occupancy; blocked cells are no data.
 
     A ring of blocked cells is laid around, so that the ground reaches to the map's very edge.
+    unit : of lengths on the map, where it is known.
     """
     if number not in (1, 2):
         raise MapError(f"band={number!r} is not in {path}; it has 1, flat ground, and 2, the cost")
@@ -42,7 +49,7 @@ def occupancy_band(
     padded = np.pad(np.where(blocked, np.nan, values), 1, constant_values=np.nan)
     rows, columns = padded.shape
     grid = Grid(rows, columns, transform @ Affine.translation(-1.0, -1.0))
-    return ArrayBand(grid=grid, label=str(path), unit="", step=0.0, array=padded)
+    return ArrayBand(grid=grid, label=str(path), unit="", step=0.0, array=padded, unit_of_axes=unit)
 
 
 # nav2: a description in YAML and a picture
@@ -73,7 +80,7 @@ def open_nav2(path: Path, number: int | str, unsaid: Unsaid) -> Band:
         @ Affine.scale(resolution, -resolution)
         @ Affine.translation(0.0, -float(len(blocked)))
     )
-    return occupancy_band(path, number, occupancy, blocked, transform)
+    return occupancy_band(path, number, occupancy, blocked, transform, METRE)
 
 
 def _description(path: Path) -> dict[str, Any]:

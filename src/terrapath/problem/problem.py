@@ -197,7 +197,8 @@ class Problem:
         blocker = f"{name}={self._show(point)} is {self.constraints.blocker(point, unit)}"
         nearest = nearest_free(self.free_space, point)
         if nearest is None:
-            raise BlockedError(f"{blocker}; no place within the bounds is free")
+            remedy = "; give a smaller radius" if self.radius > 0.0 else ""
+            raise BlockedError(f"{blocker}; no place within the bounds is free{remedy}")
         place, distance = nearest
         there = f"{self._show(place)}, {distance:.4g} {unit}".rstrip()
         if distance <= self.snap:

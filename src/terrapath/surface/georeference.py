@@ -42,14 +42,15 @@ def metres_of(unit: str) -> float | None:
 
 
 def amount(value: float, unit: str) -> str:
-    """A number with its unit: three digits after the point from 1,000 on, six below.
+    """A number with its unit: three digits after the point, six where it is small.
 
-    Seconds are also given in hours and minutes, joules in watt-hours.
+    It is small below 1, and below 1,000 where the unit is none that is measured in. Seconds are
+    also given in hours and minutes, joules in watt-hours.
     """
-    digits = ",.3f" if abs(value) >= 1000.0 else ".6f"
-    text = f"{value:{digits}} {unit}".rstrip()
     others = {"s": in_hours, "J": in_watt_hours}
-    return f"{others[unit](value)} ({text})" if unit in others else text
+    is_measured = unit in others or metres_of(unit.removeprefix("weighted ")) is not None
+    text = f"{value:{',.3f' if abs(value) >= (1.0 if is_measured else 1000.0) else '.6f'}} {unit}"
+    return f"{others[unit](value)} ({text})" if unit in others else text.rstrip()
 
 
 def in_hours(seconds: float) -> str:

@@ -54,11 +54,18 @@ def plane_metres(reference: Georeference | None) -> float | None:
     return float(reference.crs.axis_info[0].unit_conversion_factor)
 
 
+def _plane_metres(surface: Surface) -> float | None:
+    """Metres in one unit of the plane; None where that is not known."""
+    if surface.georeference is None:
+        return metres_of(surface.unit_of_axes)
+    return plane_metres(surface.georeference)
+
+
 def height_scale(surface: Surface, layer: Layer) -> float:
     """Units of the plane in one unit of a layer of heights; 1 where either is not known."""
     if layer.unit == surface.unit:
         return 1.0
-    height, plane = metres_of(layer.unit), plane_metres(surface.georeference)
+    height, plane = metres_of(layer.unit), _plane_metres(surface)
     return 1.0 if height is None or plane is None else height / plane
 
 
@@ -67,13 +74,13 @@ def height_metres(surface: Surface) -> float | None:
     k = height_layer(surface)
     if k is None:
         return None
-    unit, plane = surface.layers[k].unit, plane_metres(surface.georeference)
+    unit, plane = surface.layers[k].unit, _plane_metres(surface)
     return plane if plane is not None and unit == surface.unit else metres_of(unit)
 
 
 def ground_of(surface: Surface) -> Ground:
     """The ground under a surface. A height without a unit is in the unit of the plane."""
-    k, metres = height_layer(surface), plane_metres(surface.georeference)
+    k, metres = height_layer(surface), _plane_metres(surface)
     unit = "m" if metres is not None else "" if k is None else surface.layers[k].unit
     if k is not None and not is_weighted(surface):
         return Ground(surface, metres or 1.0, unit)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from rasterio import Affine
 
+from ..errors import MapError
 from ..validation import Array
 from .raster import SAME_PLACE, Grid
 
@@ -16,13 +17,20 @@ OUTLINE = 33  # places on each side of a map at which it is looked where it lies
 def grid_on_plane(grid: Grid) -> Grid:
     """An upright grid over all of a map, with cells that are nowhere wider than the map's own.
 
-    So no row and no column of the map is lost on the plane.
+    So no row and no column of the map is lost on the plane. Raises MapError where the cells have no
+    size on the plane.
     """
     corners = np.meshgrid(*(np.linspace(0.0, n, OUTLINE) for n in (grid.columns, grid.rows)))
     x, y = grid.on_plane(*corners)
     known = np.isfinite(x) & np.isfinite(y)
-    west, east, south, north = x[known].min(), x[known].max(), y[known].min(), y[known].max()
     sides = sides_on_plane(grid)
+    if not (known.any() and 0.0 < min(sides) <= max(sides) < math.inf):
+        place = ", ".join(f"{value:.6g}" for value in grid.extent())
+        raise MapError(
+            f"the map covers ({place}) as (x_min, y_min, x_max, y_max), where its cells have no "
+            "size; check its CRS and where its cells lie"
+        )
+    west, east, south, north = x[known].min(), x[known].max(), y[known].min(), y[known].max()
     dx, dy = sides[::-1] if _is_turned(grid) else sides
     columns = math.ceil((east - west) / dx - SAME_PLACE)
     rows = math.ceil((north - south) / dy - SAME_PLACE)

@@ -90,6 +90,7 @@ class Surface:
     is_raster: bool = False  # was it made of a grid, whose cells have slopes of their own?
     native: Native | None = None  # the map's own cells, where it was carried over from them
     unknown: npt.NDArray[np.bool_] | None = None  # cells of ``nodata`` whose height is not known
+    unit_of_axes: str = ""  # of lengths on the plane, where no CRS names it
 
     def __post_init__(self) -> None:
         require_ground(self.data)
@@ -299,7 +300,7 @@ class Surface:
     @property
     def unit(self) -> str:
         """Unit of lengths on the plane; empty where it is not known."""
-        return "" if self.georeference is None else self.georeference.unit
+        return self.unit_of_axes if self.georeference is None else self.georeference.unit
 
     @property
     def cells(self) -> Cells | None:
