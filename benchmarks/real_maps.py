@@ -185,7 +185,7 @@ def asked(surface: tp.Surface, **limits: Any) -> tp.Problem | None:
         ends = (tuple(low + share * sides) for share in (start, goal))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", tp.SnapWarning)
-            problem = tp.Problem(surface, *ends, snap=0.1 * float(sides.min()), **limits)
+            problem = tp.Problem(surface, *ends, snap=0.5 * float(sides.min()), **limits)
         if not problem.is_unreachable:
             return problem
     return None

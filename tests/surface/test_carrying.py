@@ -171,3 +171,11 @@ def test_cells_without_a_size_on_the_plane_are_refused_in_one_line(tmp_path):
     with pytest.raises(tp.MapError, match="its cells have no size; check its CRS") as caught:
         tp.read_surface(path)
     one_line(caught)
+
+
+def test_cells_that_are_slanted_out_of_all_proportion_are_refused_in_one_line(tmp_path):
+    transform = Affine(10.0, 0.0, 500_000.0, 1e11, -10.0, 4_000_120.0)
+    path = write(tmp_path / "slanted.tif", rough(12, (14, 12)), transform, None)
+    with pytest.raises(tp.MapError, match=r"so slanted or distorted .*gdalwarp") as caught:
+        tp.read_surface(path)
+    one_line(caught)

@@ -7,7 +7,6 @@ blocked stay cells of the map's own size.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -23,7 +22,7 @@ from .holes import Cells
 from .layers import Kind
 from .neighbours import bilinear
 from .places import Places, cells_along
-from .plane import steps_on_plane
+from .plane import steps_on_plane, whole_cells
 from .raster import Grid, Raster
 from .surface import Surface
 
@@ -94,9 +93,8 @@ def _finer(grid: Grid, plane: Grid) -> Grid:
     # A wave along x that the map can show crosses a cell of the plane in so many halves.
     waves_x = plane.transform.a * np.nanmax((np.abs(along_y) + np.abs(across_y)) / area)
     waves_y = plane.transform.e * np.nanmax((np.abs(along_x) + np.abs(across_x)) / area)
-    return plane.in_cells(
-        math.ceil(FINER * waves_y * plane.rows), math.ceil(FINER * waves_x * plane.columns)
-    )
+    rows, columns = FINER * waves_y * plane.rows, FINER * waves_x * plane.columns
+    return plane.in_cells(*whole_cells(grid, rows, columns))
 
 
 # Blocked cells

@@ -11,6 +11,9 @@ from ..errors import MapError
 from ..validation import Array
 from .raster import SAME_PLACE, Grid
 
+# Cells 100 times longer than wide, turned by 45 degrees, take 50 times as many upright ones.
+MOST_MORE = 1_000
+
 OUTLINE = 33  # places on each side of a map at which it is looked where it lies on the plane
 
 
@@ -18,7 +21,7 @@ def grid_on_plane(grid: Grid) -> Grid:
     """An upright grid over all of a map, with cells that are nowhere wider than the map's own.
 
     So no row and no column of the map is lost on the plane. Raises MapError where the cells have no
-    size on the plane.
+    size on the plane, or are so slanted that it takes far more upright ones.
     """
     corners = np.meshgrid(*(np.linspace(0.0, n, OUTLINE) for n in (grid.columns, grid.rows)))
     x, y = grid.on_plane(*corners)
@@ -32,10 +35,25 @@ def grid_on_plane(grid: Grid) -> Grid:
         )
     west, east, south, north = x[known].min(), x[known].max(), y[known].min(), y[known].max()
     dx, dy = sides[::-1] if _is_turned(grid) else sides
-    columns = math.ceil((east - west) / dx - SAME_PLACE)
-    rows = math.ceil((north - south) / dy - SAME_PLACE)
+    rows, columns = whole_cells(
+        grid, (north - south) / dy - SAME_PLACE, (east - west) / dx - SAME_PLACE
+    )
     transform = Affine(dx, 0.0, float(west), 0.0, dy, float(south))
     return Grid(rows, columns, transform, grid.plane, grid.map_crs or grid.crs)
+
+
+def whole_cells(grid: Grid, rows: float, columns: float) -> tuple[int, int]:
+    """So many rows and columns of upright cells, rounded up, for a map on this grid.
+
+    rows and columns are numbers of NumPy. Raises MapError where there are far too many.
+    """
+    if not rows * columns <= MOST_MORE * grid.columns * grid.rows:
+        raise MapError(
+            f"the map has {grid.columns:,} x {grid.rows:,} cells, so slanted or distorted that it "
+            f"takes {columns:,.0f} x {rows:,.0f} upright ones; check where its cells lie, or warp "
+            "it to an upright grid first (gdalwarp)"
+        )
+    return math.ceil(rows), math.ceil(columns)
 
 
 def sides_on_plane(grid: Grid) -> tuple[float, float]:
