@@ -212,7 +212,8 @@ class Eikonal:
         lattice = self.lattice
         source = kernels.Source(*model[:5])
         day = calendar_queue.typical_day(lattice.data, self.typical_cost)
-        front = calendar_queue.front_of(lattice.nx * lattice.ny, day, model.seed_values)
+        u, trial = np.full((2, lattice.nx * lattice.ny), math.inf)
+        front = calendar_queue.front_of(u, trial, day, model.seed_values)
         rows = slice(model.row, model.row + model.values.shape[0])
         columns = slice(model.column, model.column + model.values.shape[1])
         window = self.nodes["links"].reshape(lattice.ny, lattice.nx)[rows, columns]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.distance import bellman, calendar_queue, edges, ground, hopf_lax, ray, star
+from .._kernels.distance import bellman, calendar_queue, edges, ground, hopf_lax, quartet, ray, star
 from .._kernels.space.free_space import Grid
 from .._kernels.surface.cells import NO_CELLS, CostCells
 from .._kernels.surface.metric_rows import columns_of, fill_samples
@@ -21,6 +21,9 @@ from ..space.lattice import Lattice
 from ..surface import Surface
 from ..surface.metric import chord, feature_size
 from ..validation import Array, PointLike
+
+# Bytes.
+CACHE_LINE = 64
 
 # Nodes settled between two checks of the callback and of Ctrl-C.
 CHUNK = 20_000
@@ -71,10 +74,13 @@ class Medium:
         self.stars = _lay_stars(self.ground, lattice, free_space, must_stop)
         costs = [self.stars.base, self.stars.others]
         self.least_edge = min(float(cost.min(initial=math.inf)) for cost in costs)
-        per = 2 * self.ground.pieces
+        per, (layers, rows, columns) = 2 * self.ground.pieces, self.ground.heights.shape
         self.data = bellman.Medium(
             self.ground,
-            np.stack([z[::per, ::per].ravel() for z in self.ground.heights], axis=-1),
+            self.ground.heights.reshape(layers, rows * columns),
+            self.ground.costs.reshape(len(self.ground.costs), rows * columns),
+            columns,
+            self.ground.pieces * (star.NORTH * columns + star.EAST),
             self.stars,
             star.NORTH * lattice.nx + star.EAST,
             (per * np.abs(star.DIRECTIONS).max(axis=1) <= self.ground.reach).astype(np.uint8),
@@ -98,34 +104,30 @@ class Medium:
         stops the march.
         """
         lattice, count = self.lattice, self.lattice.nx * self.lattice.ny
-        begin = bellman.Source(*self._place(source), lift_of(self.surface, source))
-        state = bellman.State(
-            tau=np.full(count, math.inf),
-            best=np.full(count, hopf_lax.SEED, np.uint8),
-            queued=np.zeros(count, np.uint8),
-            times=np.zeros(count, np.uint8),
-            links=np.zeros(count, calendar_queue.LINK),
-        )
-        seeds, values = self._seeds(source, SEED_RADIUS)
+        cost = float(self.surface.cost(np.asarray(source)))
+        begin = bellman.Source(*self._place(source), lift_of(self.surface, source), cost)
+        state = _state_of(count)
+        seeds, costs = self._seeds(source, SEED_RADIUS)
         day = calendar_queue.typical_day(lattice.data, self.surface.typical_cost)
         in_order = DAY_SHARE * self.least_edge <= day
         if not in_order:
             day = DAY_SHARE * self.least_edge
         # Out of order, a day is settled wholly, so that no node within the limit is left out.
         last = float(limit) if in_order else limit + day
-        front = calendar_queue.front_of(count, day, values)
-        state.tau[seeds] = float(self.surface.cost(np.asarray(source)))
-        hopf_lax.plant(front, state, seeds, values)
+        front = calendar_queue.front_of(state.values["u"], state.values["u"], day, costs)
+        hopf_lax.plant(front, state, seeds, costs)
         settled, chunk = 0, CHUNK
         while chunk == CHUNK:
             chunk = hopf_lax.march(self.data, front, state, begin, CHUNK, last, in_order)
             settled += chunk
             if watch is not None and watch(settled):
                 break
-        for known in (state.tau, front.u):
-            known[front.u > limit] = math.inf
-        shape = (lattice.ny, lattice.nx)
-        return front.u.reshape(shape), state.tau.reshape(shape)
+        known = state.values.reshape(lattice.ny, lattice.nx)
+        del state, front  # before the copies are made
+        u, tau = known["u"].copy(), known["tau"].copy()
+        beyond = (u > limit) | (tau == math.inf)
+        u[beyond] = tau[beyond] = math.inf
+        return u, tau
 
     def _place(self, point: PointLike) -> tuple[float, float]:
         """Column and row of a point, in nodes."""
@@ -252,6 +254,20 @@ def _lay_stars(
         edges.lay_edges(samples, lattice.nx, lattice.ny, rows, stars, waiting, counts)
 
     return stars if on_all_cores(lay, parts, must_stop) else _no_stars(count)
+
+
+def _state_of(count: int) -> bellman.State:
+    """The state of so many nodes of which nothing is known."""
+    known, nodes = _aligned(count, bellman.VALUE), _aligned(count, bellman.NODE)
+    known["u"] = known["tau"] = math.inf
+    return bellman.State(known, nodes, quartet.make_quartet(), quartet.make_quartet())
+
+
+def _aligned(count: int, kind: np.dtype[Any]) -> npt.NDArray[Any]:
+    """So many records, zeros, of which none lies on two cache lines."""
+    room = np.zeros(count * kind.itemsize + CACHE_LINE, np.uint8)
+    begin = -room.ctypes.data % CACHE_LINE
+    return room[begin : begin + count * kind.itemsize].view(kind)
 
 
 def _parts(lattice: Lattice) -> list[tuple[int, int]]:

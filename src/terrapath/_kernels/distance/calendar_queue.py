@@ -6,12 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
-from ..dtypes import record
 from ..space.free_space import Grid
-
-# The lists of the buckets: the next node in the list, -1 where none; the node before it, at the
-# head -2 - bucket.
-LINK = record(("after", np.int32), ("before", np.int32))
 
 
 class Front(NamedTuple):
@@ -43,14 +38,15 @@ def typical_day(grid: Grid, cost: float) -> float:
     return BUCKET_SHARE * math.sqrt(grid.dx * grid.dy) / max(grid.nx, grid.ny) * cost
 
 
-def front_of(count: int, width: float, values: np.ndarray) -> Front:
-    """An empty queue for so many nodes, that begins on the day of the least of the values.
+def front_of(u: np.ndarray, trial: np.ndarray, width: float, values: np.ndarray) -> Front:
+    """An empty queue of nodes, that begins on the day of the least of the values.
 
-    width : of a day, map units. values : of the nodes that will be queued first, map units.
+    u, trial : as of Front, infinite. width : of a day, map units. values : of the nodes that will
+    be queued first, map units.
     """
     front = Front(
-        u=np.full(count, np.inf),
-        trial=np.full(count, np.inf),
+        u=u,
+        trial=trial,
         heads=np.full(BUCKETS, -1, np.int32),
         days_per_unit=1.0 / width,
         counters=np.zeros(2, np.int64),

@@ -298,24 +298,39 @@ def read(ground, values, layer, p):
     return p.y0 * below + p.y1 * middle + p.y2 * above
 
 
+class Tilt(NamedTuple):
+    """A layer at a place, and its slope along a vector, per sample."""
+
+    value: float
+    slope: float
+
+
 @inner_kernel
-def slope_along(ground, values, layer, p, wx, wy):
-    """The slope of a layer at a place along w, per sample."""
-    rows = (
-        row_at(ground, values, layer, p.j - 1, p),
-        row_at(ground, values, layer, p.j, p),
-        row_at(ground, values, layer, p.j + 1, p),
+def row_and_run(ground, values, layer, j, p):
+    """A layer at a place's column in row j, and its slope along x there."""
+    left, middle = sample(ground, values, layer, j, p.i - 1), sample(ground, values, layer, j, p.i)
+    right = sample(ground, values, layer, j, p.i + 1)
+    return (
+        p.x0 * left + p.x1 * middle + p.x2 * right,
+        (p.a - 0.5) * left - 2.0 * p.a * middle + (p.a + 0.5) * right,
     )
-    rise = (p.b - 0.5) * rows[0] - 2.0 * p.b * rows[1] + (p.b + 0.5) * rows[2]
-    run = zero(ground)
-    for k in range(3):
-        j, y = p.j - 1 + k, p.y0 if k == 0 else p.y1 if k == 1 else p.y2
-        run = run + y * (
-            (p.a - 0.5) * sample(ground, values, layer, j, p.i - 1)
-            - 2.0 * p.a * sample(ground, values, layer, j, p.i)
-            + (p.a + 0.5) * sample(ground, values, layer, j, p.i + 1)
-        )
-    return wx * run + wy * rise
+
+
+@inner_kernel
+def tilt_along(ground, values, layer, p, wx, wy):
+    """A layer at a place, and its slope there along w."""
+    below, run_below = row_and_run(ground, values, layer, p.j - 1, p)
+    middle, run_middle = row_and_run(ground, values, layer, p.j, p)
+    above, run_above = row_and_run(ground, values, layer, p.j + 1, p)
+    run = p.y0 * run_below + p.y1 * run_middle + p.y2 * run_above
+    rise = (p.b - 0.5) * below - 2.0 * p.b * middle + (p.b + 0.5) * above
+    return Tilt(p.y0 * below + p.y1 * middle + p.y2 * above, wx * run + wy * rise)
+
+
+@inner_kernel
+def across(ground, dx, dy):
+    """The sums of a piece d, in samples, and of w, a vector across it, over the plane."""
+    return flat(zero(ground), dx * ground.dx, dy * ground.dy, -dy * ground.dx, dx * ground.dy)
 
 
 @inner_kernel
@@ -324,20 +339,25 @@ def piece(ground, x0, y0, x2, y2):
     dx, dy = x2 - x0, y2 - y0
     p0, p2 = place_at(ground, x0, y0), place_at(ground, x2, y2)
     p1 = place_at(ground, 0.5 * (x0 + x2), 0.5 * (y0 + y2))
-    lift = flat(zero(ground), dx * ground.dx, dy * ground.dy, -dy * ground.dx, dx * ground.dy)
-    z, c = ground.heights, ground.costs
+    lift, z = across(ground, dx, dy), ground.heights
     for layer in range(z.shape[0]):
-        across = slope_along(ground, z, layer, p1, -dy, dx)
-        z0, z1 = read(ground, z, layer, p0), read(ground, z, layer, p1)
-        lift = plus_rise(lift, z0, z1, read(ground, z, layer, p2), across)
-    length = bent(lift)
-    if c.shape[0] == 0:
-        return times_cells(ground, length, x0, y0, x2, y2)
-    floor = smooth_floor(ground)
-    costs = Costs(
-        larger(read(ground, c, 0, p0), floor),
-        larger(read(ground, c, 0, p1), floor),
-        larger(read(ground, c, 0, p2), floor),
-        slope_along(ground, c, 0, p1, -dy, dx),
-    )
-    return times_cells(ground, costed(ground, lift, length, costs), x0, y0, x2, y2)
+        z1 = tilt_along(ground, z, layer, p1, -dy, dx)
+        z0, z2 = read(ground, z, layer, p0), read(ground, z, layer, p2)
+        lift = plus_rise(lift, z0, z1.value, z2, z1.slope)
+    return cost_between(ground, lift, p0, p1, p2, dx, dy)
+
+
+@inner_kernel
+def cost_between(ground, lift, p0, p1, p2, dx, dy):
+    """The cost of a piece d with a lift, from a place to the middle and on to the end."""
+    length, c = bent(lift), ground.costs
+    if c.shape[0] > 0:
+        floor, c1 = smooth_floor(ground), tilt_along(ground, c, 0, p1, -dy, dx)
+        costs = Costs(
+            larger(read(ground, c, 0, p0), floor),
+            larger(c1.value, floor),
+            larger(read(ground, c, 0, p2), floor),
+            c1.slope,
+        )
+        length = costed(ground, lift, length, costs)
+    return times_cells(ground, length, p0.i + p0.a, p0.j + p0.b, p2.i + p2.a, p2.j + p2.b)

@@ -12,9 +12,12 @@ import numpy as np
 
 from ..bits import lowest_bit
 from ..compiler import inner_kernel, kernel
-from .bellman import chord_of, node_of, value_beside, value_of
-from .calendar_queue import QUEUED, dequeue, earliest, enqueue, list_of
-from .star import BASE, EIGHTH, HALF, bits_of, place_of_other
+from ..prefetch import fetch
+from .bellman import chord_of, node_at, toward, value_at
+from .calendar_queue import DAY, QUEUED, any_of_day, dequeue, earliest, enqueue, list_of
+from .quartet import place_node
+from .star import BASE, EIGHTH, HALF, base_cost, bits_ahead, bits_back, bits_of, index, other_cost
+from .values import value_beside, values_of
 
 SEED = 255
 
@@ -29,39 +32,46 @@ AT_SOURCE = 1e-9
 @kernel
 def queue_up(front, state, n, value):
     """Queue a node for a value, or move it forward in the queue."""
-    if state.queued[n]:
-        if list_of(front, value) == list_of(front, front.trial[n]):
-            front.trial[n] = value
+    node = node_at(state, n)
+    if node.queued:
+        if list_of(front, value) == list_of(front, value_at(state, n).u):
+            value_at(state, n).u = value
             return
-        dequeue(state.links, front, n)
+        dequeue(state.nodes, front, n)
     else:
         front.counters[QUEUED] += 1
-        state.queued[n] = 1
-    enqueue(state.links, front, n, value)
+        node.queued = 1
+    enqueue(state.nodes, front, n, value)
 
 
 @inner_kernel
-def settle(medium, front, state, source, n):
-    """Give a node its value, where that is less than the one it has."""
-    node, value = node_of(medium, source, n), front.trial[n]
-    if state.best[n] != SEED:
-        value = value_of(medium, front, state, source, node, np.int64(state.best[n]))
-    if value < front.u[n]:
-        front.u[n] = value
-        # At the source itself tau has its limit, the cost there, from the beginning.
-        if node.x * node.x + node.y * node.y > AT_SOURCE * AT_SOURCE:
-            state.tau[n] = value / chord_of(medium, source, node)
-    # From now on only what is less by a share is an offer.
-    times = min(int(state.times[n]) + 1, MOST_TIMES)
-    state.times[n] = times
-    front.trial[n] = front.u[n] * (1.0 - GAIN * (1 << max(times - SELDOM, 0)))
+def settle(medium, state, source, member, value):
+    """Give a member of the quartet its value."""
+    known, node = value_at(state, member.n), node_at(state, member.n)
+    known.u = value
+    # At the source itself tau has its limit, the cost there.
+    known.tau = source.cost
+    if member.x * member.x + member.y * member.y > AT_SOURCE * AT_SOURCE:
+        known.tau = value / chord_of(medium, source, member)
+    node.times = min(int(node.times) + 1, MOST_TIMES)
+
+
+@inner_kernel
+def is_less(value, known, node):
+    """Is a value less than that of a node, by a share where that is settled?"""
+    if not value < known.u:
+        return False
+    if node.queued or known.tau == math.inf:
+        return True
+    return value < known.u * (1.0 - GAIN * (1 << max(int(node.times) - SELDOM, 0)))
 
 
 @inner_kernel
 def offer_along(front, state, x, k, value):
     """Offer a value to node x, that an edge along k leads to."""
-    if value < front.trial[x]:
-        state.best[x] = (k + HALF) % (2 * HALF)
+    node = node_at(state, x)
+    if is_less(value, value_at(state, x), node):
+        node.best = (k + HALF) % (2 * HALF)
         queue_up(front, state, x, value)
 
 
@@ -72,63 +82,132 @@ def look_again(medium, front, state, source, n):
     while bits != 0:
         k = lowest_bit(bits)
         bits &= bits - 1
-        x = n + medium.steps[k]
-        if medium.stars.wide[x] and front.u[x] < math.inf:
+        x = toward(medium, n, k)
+        if medium.stars.wide[index(x)] and value_at(state, x).tau < math.inf:
             opposite = (k + HALF) % (2 * HALF)
-            value = value_beside(medium, front, state, source, x, opposite)
+            value = value_beside(medium, state, source, x, opposite)
             offer_along(front, state, x, k, value)
 
 
 @inner_kernel
 def offer(medium, front, state, n):
     """Offer the value of a settled node along all its edges."""
-    stars, steps, u = medium.stars, medium.steps, front.u[n]
-    ahead, back = np.int64(stars.ahead[n]), np.int64(stars.back[n])
+    stars, u = medium.stars, value_at(state, n).u
+    ahead, back = bits_ahead(stars, n), bits_back(stars, n)
     for k in range(0, HALF, EIGHTH):
         if ahead >> k & 1:
-            offer_along(front, state, n + steps[k], k, u + np.float64(stars.base[n, k // EIGHTH]))
+            value = u + base_cost(stars, n, k)
+            offer_along(front, state, toward(medium, n, k), k, value)
         if back >> k & 1:
-            m = n - steps[k]
-            offer_along(front, state, m, k + HALF, u + np.float64(stars.base[m, k // EIGHTH]))
-    ahead, back, place = ahead & ~BASE, back & ~BASE, np.int64(stars.first[n])
+            m = toward(medium, n, k + HALF)
+            offer_along(front, state, m, k + HALF, u + base_cost(stars, m, k))
+    ahead, back, place = ahead & ~BASE, back & ~BASE, np.int64(stars.first[index(n)])
     while ahead != 0:
         k = lowest_bit(ahead)
         ahead &= ahead - 1
-        offer_along(front, state, n + steps[k], k, u + np.float64(stars.others[place]))
+        value = u + np.float64(stars.others[index(place)])
+        offer_along(front, state, toward(medium, n, k), k, value)
         place += 1
     while back != 0:
         k = lowest_bit(back)
         back &= back - 1
-        m = n - steps[k]
-        cost = np.float64(stars.others[place_of_other(stars, m, k)])
-        offer_along(front, state, m, k + HALF, u + cost)
+        m = toward(medium, n, k + HALF)
+        offer_along(front, state, m, k + HALF, u + other_cost(stars, m, k))
 
 
 @kernel
 def plant(front, state, seeds, values):
     """Queue the seeds with their values."""
     for m in range(seeds.shape[0]):
-        state.best[seeds[m]] = SEED
+        node_at(state, seeds[m]).best = SEED
         queue_up(front, state, seeds[m], values[m])
+
+
+@inner_kernel
+def fetch_around(medium, state, n):
+    """Ask for what is known around a node."""
+    stars, j = medium.stars, int((n + 0.5) * medium.row_per_node)
+    at = 2 * medium.ground.pieces * (j * medium.columns + n - j * medium.grid.nx)
+    for layer in range(medium.samples.shape[0]):
+        for row in range(-1, 2):
+            fetch(medium.samples[layer], at + row * medium.columns)
+    fetch(stars.ahead, n)
+    fetch(stars.back, n)
+    fetch(stars.first, n)
+    fetch(state.nodes, n)
+    for row in range(-1, 2):
+        m = n + row * medium.grid.nx
+        fetch(state.values, m - 1)
+        fetch(state.values, m + 1)
+        fetch(stars.base, 4 * m)
+
+
+@inner_kernel
+def fetch_next(medium, front, state):
+    """Ask for what is known around the nodes that will be taken next."""
+    n = front.heads[front.counters[DAY] & (front.heads.shape[0] - 1)]
+    for _ in range(4):
+        if n < 0:
+            return
+        fetch_around(medium, state, n)
+        n = node_at(state, n).after
+
+
+@inner_kernel
+def take(medium, front, state, source, node, n):
+    """Take node n out of the queue."""
+    dequeue(state.nodes, front, n)
+    front.counters[QUEUED] -= 1
+    node_at(state, n).queued = 0
+    place_node(medium, source, node, n, np.int64(node_at(state, n).best))
+
+
+@inner_kernel
+def take_four(medium, front, state, source, first, most):
+    """Take a node and up to three more of its day, but no seed beside others; returns how many."""
+    nodes = state.quartet.nodes
+    take(medium, front, state, source, nodes[0], first)
+    if nodes[0].a == SEED:
+        return 1
+    for count in range(1, min(most, 4)):
+        n = any_of_day(state.nodes, front, front.counters[DAY])
+        if n < 0 or node_at(state, n).best == SEED:
+            return count
+        take(medium, front, state, source, nodes[count], n)
+    return max(min(most, 4), 1)
+
+
+@inner_kernel
+def settle_four(medium, front, state, source, count):
+    """Settle the nodes that were taken."""
+    nodes = state.quartet.nodes
+    if nodes[0].a == SEED:
+        settle(medium, state, source, nodes[0], value_at(state, nodes[0].n).u)
+        return
+    values = values_of(medium, state, source, state.quartet, count)
+    for m in range(count):
+        value = min(values[m], value_at(state, nodes[m].n).u)
+        settle(medium, state, source, nodes[m], value)
 
 
 @kernel
 def march(medium, front, state, source, most, limit, in_order):
     """Settle up to ``most`` nodes with trial values up to ``limit``; returns how many.
 
-    in_order : within a day of the queue, too.
+    in_order : within a day of the queue, too. Otherwise up to four nodes of a day at once.
     """
-    for settled in range(most):
-        if front.counters[QUEUED] == 0:
+    settled = 0
+    while settled < most and front.counters[QUEUED] > 0:
+        n = earliest(state.nodes, front, in_order)
+        if value_at(state, n).u > limit:
             return settled
-        n = earliest(state.links, front, in_order)
-        if front.trial[n] > limit:
-            return settled
-        dequeue(state.links, front, n)
-        front.counters[QUEUED] -= 1
-        state.queued[n] = 0
-        settle(medium, front, state, source, n)
-        offer(medium, front, state, n)
-        if medium.stars.wide[n]:
-            look_again(medium, front, state, source, n)
-    return most
+        count = take_four(medium, front, state, source, n, 1 if in_order else most - settled)
+        fetch_next(medium, front, state)
+        settle_four(medium, front, state, source, count)
+        settled += count
+        for m in range(count):
+            n = state.quartet.nodes[m].n
+            offer(medium, front, state, n)
+            if medium.stars.wide[index(n)]:
+                look_again(medium, front, state, source, n)
+    return settled

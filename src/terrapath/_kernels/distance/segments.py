@@ -1,52 +1,43 @@
-"""The place on the segment between two neighbours of a node that offers the least value."""
+"""The places on the segments between two neighbours of four nodes that offer the least values.
 
-import math
+Everything here is of four nodes at once.
+"""
+
 from typing import NamedTuple
 
 import numpy as np
 
 from ..compiler import inner_kernel
+from ..vec4 import any_above, four, larger, sqrt, where_above
+from .star import ACUTE
 
 
 class End(NamedTuple):
-    """The end a of a node's edge, where segments begin."""
+    """The ends a of an edge of each node, where segments begin."""
 
-    direction: np.int64
-    aa: float  # of the lift from the node to a, squared
-    ss: float  # of the lift from the source to a, squared
-    near: float  # the chords from the node, and from the source
-    far: float
-    cost: float  # of the edge, per chord
-    tau: float
-    u: float
+    aa: np.ndarray  # of the lift from the node to a, squared
+    ss: np.ndarray  # of the lift from the source to a, squared
+    near: np.ndarray  # the chords from the node, and from the source
+    far: np.ndarray
+    cost: np.ndarray  # of the edge, per chord
+    tau: np.ndarray
+    u: np.ndarray
 
 
 class Segment(NamedTuple):
-    """The segment from the end a of an edge to the end b of the next, and a place on it.
+    """The segments from the ends a of edges to the ends b of the next edges.
 
     ae, ee, se : products of b - a with the lift from the node to a, itself, and the lift from the
     source to a.
     """
 
-    direction: np.int64  # of the edge to b
-    ae: float
-    ee: float
-    se: float
-    cost: float  # of the edge to b, per chord
-    tau: float  # of b
-    t: float  # where least is offered; 0 where that is a, or where there is no segment
-
-
-NO_SEGMENT = Segment(np.int64(-1), 0.0, 1.0, 0.0, 1.0, 1.0, 0.0)
-
-
-@inner_kernel
-def value_on(a, s, t):
-    """The value offered from the place t of a segment: costs per chord, and tau, are linear."""
-    c, tau = a.cost + t * (s.cost - a.cost), a.tau + t * (s.tau - a.tau)
-    near = math.sqrt(max(a.aa + t * (2.0 * s.ae + t * s.ee), 0.0))
-    far = math.sqrt(max(a.ss + t * (2.0 * s.se + t * s.ee), 0.0))
-    return c * near + tau * far
+    exists: np.ndarray  # 1, or 0 where there is no segment
+    ae: np.ndarray
+    ee: np.ndarray
+    se: np.ndarray
+    cost: np.ndarray  # of the edge to b, per chord
+    tau: np.ndarray  # of b
+    u: np.ndarray
 
 
 # The least is at the beginning where t is no more than this.
@@ -54,6 +45,38 @@ LEAST_T = 1e-6
 
 # A step of Newton's method that moves t by no more leaves out a share of the value of some 1e-12.
 MOST_MOVED = 1e-3
+
+# Added to a chord that may be 0 and divides.
+TINY = 1e-300
+
+
+@inner_kernel
+def smaller(a, b):
+    return where_above(a, b, b, a)
+
+
+@inner_kernel
+def size(a):
+    return larger(a, 0.0 - a)
+
+
+@inner_kernel
+def near_on(a, s, t):
+    """The chord from the node to the place t, squared."""
+    return larger(a.aa + t * (2.0 * s.ae + t * s.ee), 0.0)
+
+
+@inner_kernel
+def far_on(a, s, t):
+    """The chord from the source to the place t, squared."""
+    return larger(a.ss + t * (2.0 * s.se + t * s.ee), 0.0)
+
+
+@inner_kernel
+def value_on(a, s, t):
+    """The value offered from the place t of a segment: costs per chord, and tau, are linear."""
+    c, tau = a.cost + t * (s.cost - a.cost), a.tau + t * (s.tau - a.tau)
+    return c * sqrt(near_on(a, s, t)) + tau * sqrt(far_on(a, s, t))
 
 
 @inner_kernel
@@ -65,37 +88,57 @@ def improved(a, s, t):
     """
     c_rise, tau_rise = s.cost - a.cost, s.tau - a.tau
     c, tau = a.cost + t * c_rise, a.tau + t * tau_rise
-    near = math.sqrt(max(a.aa + t * (2.0 * s.ae + t * s.ee), 0.0))
-    far = math.sqrt(max(a.ss + t * (2.0 * s.se + t * s.ee), 0.0))
-    if not (near > 0.0 and far > 0.0):
-        return t
+    near, far = sqrt(near_on(a, s, t)) + TINY, sqrt(far_on(a, s, t)) + TINY
     near_rise, far_rise = (s.ae + t * s.ee) / near, (s.se + t * s.ee) / far
     slope = c * near_rise + c_rise * near + tau * far_rise + tau_rise * far
     bend = c * (s.ee - near_rise * near_rise) / near + tau * (s.ee - far_rise * far_rise) / far
-    bend += 2.0 * (c_rise * near_rise + tau_rise * far_rise)
-    return min(max(t - slope / bend, 0.0), 1.0) if bend > 0.0 else t
+    bend = bend + 2.0 * (c_rise * near_rise + tau_rise * far_rise)
+    moved = t - slope / where_above(bend, 0.0, bend, 1.0)
+    return where_above(bend, 0.0, smaller(larger(moved, 0.0), 1.0), t)
 
 
 @inner_kernel
-def place_of_least(a, s, u):
-    """The t of the place on a segment that offers least; 0 where that is its beginning.
-
-    u : the value at the segment's end.
-    """
+def fall_along(a, s):
+    """By how much the value falls from the beginning of a segment on; 0 where it does not."""
     rise = (s.cost - a.cost) * a.near
-    # By how much the value rises from the beginning on; at the source there is no such slope.
-    if a.far > 0.0:
-        start = a.tau * s.se / a.far + (s.tau - a.tau) * a.far + rise + a.cost * s.ae / a.near
-        if start >= 0.0:
-            return 0.0
-    rise, c = rise + u - a.u, 0.5 * (a.cost + s.cost)
-    room = c * c * s.ee - rise * rise
-    t = 0.5
-    if room > 0.0:
-        across = max(a.aa - s.ae * s.ae / s.ee, 0.0)
-        t = -s.ae / s.ee - rise * math.sqrt(across / (s.ee * room))
-    first = min(max(t, 0.0), 1.0)
+    slope = a.tau * s.se / (a.far + TINY) + (s.tau - a.tau) * a.far + rise + a.cost * s.ae / a.near
+    # At the source there is no such slope.
+    fall = where_above(a.far, 0.0, 0.0 - slope, 1.0)
+    return where_above(s.exists, 0.0, larger(fall, 0.0), 0.0)
+
+
+@inner_kernel
+def place_of_least(a, s):
+    """The t of the place on a segment that offers least; 0 where that is its beginning."""
+    rise, c = (s.cost - a.cost) * a.near + s.u - a.u, 0.5 * (a.cost + s.cost)
+    room = s.ee * (c * c * s.ee - rise * rise)
+    across = larger(a.aa - s.ae * s.ae / s.ee, 0.0)
+    t = 0.0 - s.ae / s.ee - rise * sqrt(across / where_above(room, 0.0, room, 1.0))
+    first = where_above(room, 0.0, smaller(larger(t, 0.0), 1.0), 0.5)
     t = improved(a, s, first)
-    if abs(t - first) > MOST_MOVED:
-        t = improved(a, s, t)
-    return t if t > LEAST_T else 0.0
+    moved = size(t - first)
+    if any_above(moved, MOST_MOVED):
+        t = where_above(moved, MOST_MOVED, improved(a, s, t), t)
+    return where_above(t, LEAST_T, t, 0.0)
+
+
+@inner_kernel
+def is_wide(a, s):
+    """1 where the angle between the edges to both ends of a segment is too wide, else 0."""
+    both = larger(a.aa + s.ae, 0.0)
+    limit = ACUTE * ACUTE * a.aa * (a.aa + 2.0 * s.ae + s.ee)
+    return where_above(limit, both * both, 1.0, four(0.0, 0.0, 0.0, 0.0))
+
+
+@inner_kernel
+def first_where_above(x, limit, a, b):
+    """The segments a where x is above the limit, else b."""
+    return Segment(
+        where_above(x, limit, a.exists, b.exists),
+        where_above(x, limit, a.ae, b.ae),
+        where_above(x, limit, a.ee, b.ee),
+        where_above(x, limit, a.se, b.se),
+        where_above(x, limit, a.cost, b.cost),
+        where_above(x, limit, a.tau, b.tau),
+        where_above(x, limit, a.u, b.u),
+    )

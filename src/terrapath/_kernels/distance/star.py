@@ -84,10 +84,10 @@ def product(h, a, b):
 
 
 @inner_kernel
-def is_wide(h, a, b):
-    """Is the angle between two directions too wide, for any of the metrics?"""
+def width_above(h, a, b):
+    """Above 0 where the angle between two directions is too wide for a metric."""
     both = larger(product(h, a, b), 0.0)
-    return any_above(ACUTE * ACUTE * product(h, a, a) * product(h, b, b), both * both)
+    return ACUTE * ACUTE * product(h, a, a) * product(h, b, b) - both * both
 
 
 @inner_kernel
@@ -109,15 +109,15 @@ def metric_of_node(ground, i, j):
 
 @kernel
 def directions_between(h, a, width):
-    """The bits of the directions needed between a and a + width; and WIDE, where these are not
-    enough.
+    """The bits of the directions needed between a and a + width, between which the angle is too
+    wide; and WIDE, where these are not enough.
     """
-    bits, k = 0, 0
-    pieces = 1  # the k-th of so many equal parts is looked at
+    bits = 1 << a + width // 2
+    k, pieces = 0, 2  # the k-th of so many equal parts is looked at
     while k < pieces:
         part = width // pieces
         begin = a + k * part
-        if is_wide(h, begin, (begin + part) % (2 * HALF)):
+        if width_above(h, begin, (begin + part) % (2 * HALF)) > 0.0:
             if part > 1:
                 bits |= 1 << begin + part // 2
                 k, pieces = 2 * k, 2 * pieces
@@ -127,17 +127,6 @@ def directions_between(h, a, width):
         while k % 2 == 0 and pieces > 1:
             k, pieces = k // 2, pieces // 2
     return bits
-
-
-@inner_kernel
-def has_wide_angles(h):
-    """Are any of the angles between the eight neighbours too wide?"""
-    return (
-        is_wide(h, 0, EIGHTH)
-        or is_wide(h, EIGHTH, 2 * EIGHTH)
-        or is_wide(h, 2 * EIGHTH, 3 * EIGHTH)
-        or is_wide(h, 3 * EIGHTH, 4 * EIGHTH)
-    )
 
 
 @inner_kernel
@@ -161,14 +150,35 @@ def add_edges(nx, ny, i, j, bits, ahead, back):
             back[n] |= 1 << k
 
 
-@kernel
-def add_others(ground, nx, ny, i, j, ahead, back, wide):
-    """Add the edges of node (i, j) that have other directions than those of BASE."""
-    h, bits = metric_of_node(ground, i, j), 0
-    for a in range(0, HALF, EIGHTH):
-        bits |= directions_between(h, a, EIGHTH)
-    wide[j * nx + i] = bits & WIDE != 0
+@inner_kernel
+def add_between(h, nx, ny, i, j, a, ahead, back, wide):
+    """Add the edges of node (i, j) between direction a and the next of BASE."""
+    bits = directions_between(h, a, EIGHTH)
+    if bits & WIDE:
+        wide[j * nx + i] = 1
     add_edges(nx, ny, i, j, bits & ~WIDE, ahead, back)
+
+
+@inner_kernel
+def choose_for_one(ground, nx, ny, i, j, ahead, back, wide):
+    """Choose the edges that the star of node (i, j) needs beside those of BASE."""
+    h = metric_of_node(ground, i, j)
+    for a in range(0, HALF, EIGHTH):
+        if width_above(h, a, a + EIGHTH) > 0.0:
+            add_between(h, nx, ny, i, j, a, ahead, back, wide)
+
+
+@inner_kernel
+def choose_for_four(fours, nx, ny, i, j, ahead, back, wide):
+    """Choose the edges of four nodes side by side, (i, j) the first."""
+    h = metric_of_node(fours, i, j)
+    for a in range(0, HALF, EIGHTH):
+        above = width_above(h, a, a + EIGHTH)
+        if any_above(above, 0.0):
+            for m in range(4):
+                if above[m] > 0.0:
+                    one = Metric(h.h11[m], h.h12[m], h.h22[m])
+                    add_between(one, nx, ny, i + m, j, a, ahead, back, wide)
 
 
 @kernel
@@ -181,11 +191,11 @@ def choose_edges(ground, nx, ny, rows, ahead, back, wide):
     fours = seen_from(ground, per, 2 * per, 3 * per)
     for j in range(rows[0], rows[1]):
         for i in range(0, nx, 4):
-            inside = i > 0 and i + 4 < nx and 0 < j < ny - 1
-            if inside and not has_wide_angles(metric_of_node(fours, i, j)):
+            if i > 0 and i + 4 < nx and 0 < j < ny - 1:
+                choose_for_four(fours, nx, ny, i, j, ahead, back, wide)
                 continue
             for k in range(i, min(i + 4, nx)):
-                add_others(ground, nx, ny, k, j, ahead, back, wide)
+                choose_for_one(ground, nx, ny, k, j, ahead, back, wide)
 
 
 def base_edges(nx: int, ny: int) -> tuple[np.ndarray, np.ndarray]:
@@ -247,25 +257,53 @@ def list_edges(stars: Stars) -> tuple[np.ndarray, ...]:
 
 
 @inner_kernel
+def index(n):
+    """A number as an index that Numba knows is not counted from the end, which saves time."""
+    return np.uint64(n)
+
+
+@inner_kernel
+def bits_ahead(stars, n):
+    """The directions of the edges ahead from a node."""
+    return np.int64(stars.ahead[index(n)])
+
+
+@inner_kernel
+def bits_back(stars, n):
+    """The directions, read the other way, of the edges that lead to a node."""
+    return np.int64(stars.back[index(n)])
+
+
+@inner_kernel
 def bits_of(stars, n):
     """The directions of all edges of a node, both ways."""
-    return np.int64(stars.ahead[n]) | np.int64(stars.back[n]) << HALF
+    return bits_ahead(stars, n) | bits_back(stars, n) << HALF
 
 
 @inner_kernel
 def place_of_other(stars, n, k):
     """Where the cost of an edge ahead is listed that has another direction than those of BASE."""
-    return stars.first[n] + count_bits(np.int64(stars.ahead[n]) & ~BASE & (1 << k) - 1)
+    return stars.first[index(n)] + count_bits(bits_ahead(stars, n) & ~BASE & (1 << k) - 1)
+
+
+@inner_kernel
+def base_cost(stars, n, k):
+    """The cost of an edge ahead along a direction of BASE."""
+    return np.float64(stars.base[index(n), index(k // EIGHTH)])
+
+
+@inner_kernel
+def other_cost(stars, n, k):
+    """The cost of an edge ahead along another direction."""
+    return np.float64(stars.others[index(place_of_other(stars, n, k))])
 
 
 @inner_kernel
 def cost_along(stars, steps, n, k):
     """The cost of an edge along any direction. steps : directions as differences of numbers."""
     if k >= HALF:
-        n, k = n + steps[k], k - HALF
-    if k % EIGHTH == 0:
-        return np.float64(stars.base[n, k // EIGHTH])
-    return np.float64(stars.others[place_of_other(stars, n, k)])
+        n, k = n + steps[index(k)], k - HALF
+    return base_cost(stars, n, k) if k % EIGHTH == 0 else other_cost(stars, n, k)
 
 
 @inner_kernel
