@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from .._kernels.travel.paces import Pace
+from .._kernels.travel.paces import Pace, evaluate_jets
 from .._kernels.travel.priced import PricedPeaks, PricedSpline
 from ..errors import InputError
 from ..space.lattice import Lattice, Spacing
@@ -156,9 +156,18 @@ def _with_pace(surface: Surface, model: TravelModel, ground: Ground) -> Surface:
     used = model if _has_costs(surface) else model.gauged()
     least = max(_least(used) * (1.0 - NOTHING), 1e-100) * ground.metres
     pace, data = _scaled(used.pace, ground.metres), surface.data
-    fields = data._asdict() | {"pace": pace, "least": least}
+    soft = {"jumps": _jumps(pace), "width": 0.0, "share": 0.0}
+    fields = data._asdict() | {"pace": pace, "least": least, **soft}
     made = PricedSpline(**fields) if is_spline(data) else PricedPeaks(**fields)
     return replace(surface, data=cast("Any", made))
+
+
+def _jumps(pace: Pace) -> Array:
+    """(k,): by how much the slope of a pace grows at each of its kinks."""
+    before, after = np.empty((2, len(pace.kinks), 3))
+    evaluate_jets(pace, np.nextafter(pace.kinks, -np.inf), before)
+    evaluate_jets(pace, pace.kinks, after)
+    return np.ascontiguousarray(after[:, 1] - before[:, 1])
 
 
 def _scaled(pace: Pace, factor: float) -> Pace:

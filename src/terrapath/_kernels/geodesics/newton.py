@@ -11,43 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
+from ..dispatch import per_class
 from ..surface.surfaces import jet_at, log_cost_at, put_jet
-
-
-class Block(NamedTuple):
-    """A 2 x 2 matrix."""
-
-    a: float
-    b: float
-    c: float
-    d: float
-
-
-@inner_kernel
-def product(m, k):
-    return Block(
-        m.a * k.a + m.b * k.c,
-        m.a * k.b + m.b * k.d,
-        m.c * k.a + m.d * k.c,
-        m.c * k.b + m.d * k.d,
-    )
-
-
-@inner_kernel
-def transposed(m):
-    return Block(m.a, m.c, m.b, m.d)
-
-
-@inner_kernel
-def inverse(m):
-    det = m.a * m.d - m.b * m.c
-    return Block(m.d / det, -m.b / det, -m.c / det, m.a / det)
-
-
-@inner_kernel
-def entry(blocks, i):
-    """Block i of an array (m, 2, 2)."""
-    return Block(blocks[i, 0, 0], blocks[i, 0, 1], blocks[i, 1, 0], blocks[i, 1, 1])
+from ..travel.priced import per_price
+from .blocks import Block, confined, entry, inverse, product, put, put_squared_cost, transposed
+from .paced import (
+    PacedStrand,
+    lift_paced,
+    paced_link_block,
+    paced_own_block,
+    paced_pull,
+)
 
 
 class Strand(NamedTuple):
@@ -107,11 +81,7 @@ def squared_chord(strand, piece):
 
 
 @kernel
-def own_block(strand, i, curvature):
-    """Half the energy's second derivative by inner point i.
-
-    curvature : the share that is taken of the second derivatives of the layers and the cost.
-    """
+def metric_own_block(strand, i, curvature):
     at = i + 1
     m, cost = frame_product(strand, at, at), strand.costs[at]
     stiffness = strand.stiffness[i] + strand.stiffness[i + 1]
@@ -130,9 +100,16 @@ def own_block(strand, i, curvature):
     return Block(a, b, b, d)
 
 
+@per_class({Strand: metric_own_block, PacedStrand: paced_own_block})
+def own_block(strand, i, curvature):
+    """Half the energy's second derivative by inner point i.
+
+    curvature : the share that is taken of the second derivatives of the layers and the cost.
+    """
+
+
 @kernel
-def link_block(strand, i, curvature):
-    """Half the energy's second derivative by inner points i and i + 1."""
+def metric_link_block(strand, i, curvature):
     at, piece = i + 1, i + 1
     m, stiffness = frame_product(strand, at, at + 1), strand.stiffness[piece]
     (ax, ay), (bx, by) = seen_from(strand, at, piece), seen_from(strand, at + 1, piece)
@@ -145,31 +122,34 @@ def link_block(strand, i, curvature):
     )
 
 
-@kernel
-def confined(m, projector):
-    """P M P + (I - P): M for the moves that the projector P allows, the identity for the others."""
-    k = product(product(projector, m), projector)
-    p = projector
-    return Block(k.a + 1.0 - p.a, k.b - p.b, k.c - p.c, k.d + 1.0 - p.d)
+@per_class({Strand: metric_link_block, PacedStrand: paced_link_block})
+def link_block(strand, i, curvature):
+    """Half the energy's second derivative by inner points i and i + 1."""
+
+
+@inner_kernel
+def metric_pull(strand, i):
+    jets, weights, pull = strand.jets, strand.weights, strand.pull
+    gx, gy = strand.drift[i, 0] + pull[i, 0], strand.drift[i, 1] + pull[i, 1]
+    for k in range(weights.shape[0]):
+        gx += weights[k] * jets[i + 1, k, 1] * pull[i, k + 2]
+        gy += weights[k] * jets[i + 1, k, 2] * pull[i, k + 2]
+    return gx, gy
+
+
+@per_class({Strand: metric_pull, PacedStrand: paced_pull})
+def pull_at(strand, i):
+    """Half the energy's derivative by inner point i."""
 
 
 @kernel
 def fill_derivative(strand, projectors, derivative):
     """Half the energy's derivative by each inner point, along the moves it is free to make."""
-    jets, weights, pull = strand.jets, strand.weights, strand.pull
-    for i in range(pull.shape[0]):
-        gx, gy = strand.drift[i, 0] + pull[i, 0], strand.drift[i, 1] + pull[i, 1]
-        for k in range(weights.shape[0]):
-            gx += weights[k] * jets[i + 1, k, 1] * pull[i, k + 2]
-            gy += weights[k] * jets[i + 1, k, 2] * pull[i, k + 2]
+    for i in range(derivative.shape[0]):
+        gx, gy = pull_at(strand, i)
         p = entry(projectors, i)
         derivative[i, 0] = p.a * gx + p.b * gy
         derivative[i, 1] = p.c * gx + p.d * gy
-
-
-@kernel
-def put(blocks, i, m):
-    blocks[i, 0, 0], blocks[i, 0, 1], blocks[i, 1, 0], blocks[i, 1, 1] = m.a, m.b, m.c, m.d
 
 
 @kernel
@@ -257,15 +237,6 @@ def newton_step(strand, projectors, curvature, workspace):
 # The surface along a polyline
 
 
-@inner_kernel
-def put_squared_cost(row, log):
-    """The jet of c^2 = exp(2 log c), from that of log c."""
-    c2, x, y = math.exp(2.0 * log.f), 2.0 * log.fx, 2.0 * log.fy
-    row[0], row[1], row[2] = c2, c2 * x, c2 * y
-    row[3], row[4] = c2 * (2.0 * log.fxx + x * x), c2 * (2.0 * log.fxy + x * y)
-    row[5] = c2 * (2.0 * log.fyy + y * y)
-
-
 @kernel
 def fill_pieces(strand):
     """Fill chords, stiffness, pull and drift from the jets at the points. Returns the energy."""
@@ -289,11 +260,15 @@ def fill_pieces(strand):
 
 
 @kernel
-def lift(surface, strand):
-    """Evaluate the surface at the points of a polyline. Returns the polyline's energy."""
+def lift_metric(surface, strand):
     for m in range(strand.points.shape[0]):
         x, y = strand.points[m, 0], strand.points[m, 1]
         for layer in range(strand.weights.shape[0]):
             put_jet(strand.jets[m, layer], jet_at(surface, layer, x, y))
         put_squared_cost(strand.costs[m], log_cost_at(surface, x, y))
     return fill_pieces(strand)
+
+
+@per_price(lift_metric, lift_paced)
+def lift(surface, strand):
+    """Evaluate the surface at the points of a polyline. Returns the polyline's energy."""

@@ -24,6 +24,9 @@ class PricedPeaks(NamedTuple):
     weights: np.ndarray
     pace: Pace
     least: float  # P is nowhere below it
+    jumps: np.ndarray  # of the slope at its kinks
+    width: float  # that a kink has where a path is pulled taut, in grades
+    share: float  # of the length that is added there, cost per map unit
 
     plain = Peaks  # type: ignore[misc]
 
@@ -42,6 +45,9 @@ class PricedSpline(NamedTuple):
     floor: float
     pace: Pace
     least: float  # P is nowhere below it
+    jumps: np.ndarray  # of the slope at its kinks
+    width: float  # that a kink has where a path is pulled taut, in grades
+    share: float  # of the length that is added there, cost per map unit
 
     plain = Spline  # type: ignore[misc]
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from ..._kernels.geodesics.paced import PacedStrand
 from ..._support.watching import MustStop, never, stop_after
 from ...errors import InputError, UnfinishedWarning, tell
 from ...problem import Path, Problem
@@ -22,6 +23,7 @@ from .newton import (
     placed_parameters,
     shortest_polyline,
 )
+from .paced import chords_of
 
 __all__ = ["refine", "shortest_polyline"]
 
@@ -31,6 +33,8 @@ TOLERANCE = 3e-8  # by which the polyline may be longer than the geodesic, relat
 # as many as make the geodesic through its points exact.
 FEWEST_PIECES, MOST_PIECES = 32, 4096
 PIECES_PER_FEATURE = 8.0
+# Under a pace: along a kink the curve has to keep to one grade between its points, too.
+PACED_PIECES_PER_FEATURE = 32.0
 STAGES = 3
 
 # A path begins at the problem's start if it begins within this share of the region's side of it;
@@ -44,6 +48,8 @@ ROUNDING = 1e-12
 SMOOTH = 1.1
 # After it was shortened, a path becomes shorter by less than this share.
 LITTLE = 0.01
+# Under a pace a path that ran zigzag along a kink is pulled again while it gains this share.
+WORTH_REPEATING, MOST_REPEATS = 1e-5, 4
 # Features this many times as long as wide are too many for a model that takes them as round.
 LONG = 4.0
 
@@ -92,6 +98,7 @@ def refine(
     if is_hard:
         return _refined_on_rough_ground(problem, given, tolerance, must_stop, rival)
     best, is_pulled = _pulled(problem, given, tolerance, must_stop)
+    best = _pulled_again(problem, best, tolerance, must_stop) if is_pulled else best
     if not (is_pulled or given.gauged == 0.0 or must_stop()):
         tell(UnfinishedWarning(NO_ROOM))
     return best
@@ -143,16 +150,30 @@ def _refined_on_rough_ground(
     best = _shortened(problem, given, must_stop, rival)
     is_worth_it = best.gauged * (1.0 - LITTLE) <= rival
     if is_worth_it and _is_resolved(problem.priced, best):
-        return _pulled(problem, best, tolerance, must_stop, is_near=True)[0]
+        best = _pulled(problem, best, tolerance, must_stop, is_near=True)[0]
+        return _pulled_again(problem, best, tolerance, must_stop)
+    return best
+
+
+def _pulled_again(problem: Problem, best: Path, tolerance: float, must_stop: MustStop) -> Path:
+    """The path, under a pace pulled again while it gains by that."""
+    for _ in range(MOST_REPEATS if problem.travel is not None else 0):
+        before = best
+        best, _ = _pulled(problem, before, tolerance, must_stop, is_near=True)
+        if must_stop() or best.gauged >= before.gauged * (1.0 - WORTH_REPEATING):
+            break
     return best
 
 
 def _is_resolved(surface: Surface, path: Path) -> bool:
     """Are the pieces of a polyline short enough for a model of smooth ground?"""
-    pieces = _stages(_features(surface, path))[-1]
+    pieces = _stages(surface, path)[-1]
     if pieces == MOST_PIECES:
         return False
-    energy = lift(surface, along(path.points, pieces)).energy
+    lifted = lift(surface, along(path.points, pieces))
+    if isinstance(lifted.strand, PacedStrand):
+        return path.gauged <= SMOOTH * float(chords_of(lifted.strand).sum())
+    energy = lifted.energy
     return math.sqrt(energy) <= SMOOTH * path.gauged
 
 
@@ -212,7 +233,7 @@ def _refined(
     if given.gauged == 0.0 or must_stop():
         return
     if not (space.geometries or space.circles or space.masks):
-        candidates = _geodesics(problem.surface, given, tolerance, must_stop, is_near)
+        candidates = _geodesics(problem.priced, given, tolerance, must_stop, is_near)
         if all(problem.bounds.contains(points).all() for points in candidates):
             yield from candidates
             return
@@ -227,16 +248,18 @@ def _features(surface: Surface, given: Path) -> float:
     Newton's method makes pieces equally long under h, which includes the cost, but features have
     their size on the plane. So pieces are longest on the plane where the cost is least.
     """
-    length = given.length
-    if surface.costs:
+    length = given.length if given.pricing is None else given.line.length
+    if surface.costs and given.pricing is None:
         length /= float(surface.cost(along(given.points, MOST_PIECES)).min())
     return length / surface.resolution
 
 
-def _stages(features: float) -> tuple[int, ...]:
+def _stages(surface: Surface, given: Path) -> tuple[int, ...]:
     """Numbers of pieces, from coarse to fine."""
+    features = _features(surface, given)
+    per_feature = PIECES_PER_FEATURE if given.pricing is None else PACED_PIECES_PER_FEATURE
     first = min(max(math.ceil(features), FEWEST_PIECES), MOST_PIECES)
-    last = min(max(math.ceil(PIECES_PER_FEATURE * features), 2 * FEWEST_PIECES), MOST_PIECES)
+    last = min(max(math.ceil(per_feature * features), 2 * FEWEST_PIECES), MOST_PIECES)
     return tuple(round(count) for count in np.geomspace(first, last, STAGES))
 
 
@@ -248,7 +271,7 @@ def _geodesics(
     Where the surface is too rough for the geodesic to be exact, the polyline of least energy comes
     before it. Where it must stop, only the polyline as far as it is pulled.
     """
-    stages = _stages(_features(surface, given))[-1 if is_near else 0 :]
+    stages = _stages(surface, given)[-1 if is_near else 0 :]
     polyline = shortest_polyline(surface, along(given.points, stages[0]), stages, must_stop)
     if must_stop():
         return [polyline]

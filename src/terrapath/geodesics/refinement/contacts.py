@@ -17,11 +17,14 @@ import shapely
 
 from ..._kernels.geodesics import contacts as kernels
 from ..._kernels.geodesics.newton import Strand
+from ..._kernels.geodesics.paced import PacedStrand
+from ..._kernels.travel.priced import is_directed
 from ..._support.watching import MustStop, never
 from ...space.free_space import Indices
 from ...surface import Surface
 from ...validation import Array
 from .newton import lift, lower
+from .paced import forces_of, softened
 from .walls import SLACK, Surroundings
 
 NONE = -1
@@ -193,13 +196,13 @@ def outwards(around: Surroundings, band: Band) -> Array:
 
 
 def loosened(
-    around: Surroundings, band: Band, path: Strand, releases: dict[int, int]
+    around: Surroundings, band: Band, path: Strand | PacedStrand, releases: dict[int, int]
 ) -> Band | None:
     """The band without the contacts that pull at the path; None where there are none.
 
     path : the band, lifted. releases : how often each corner was released before; it is updated.
     """
-    force = _forces(path)
+    force = forces_of(path) if isinstance(path, PacedStrand) else _forces(path)
     pull = (force * outwards(around, band)).sum(axis=1)
     along = _directions(band.points)
     turns_back = (along[1:] * along[:-1]).sum(axis=1) < TURNED_BACK
@@ -257,6 +260,12 @@ def tightened(
 
     Where it must stop, the band as far as it is pulled.
     """
+    for ground in softened(surface) if is_directed(surface.data) else (surface,):
+        band = _tightened(ground, around, band, must_stop)
+    return band
+
+
+def _tightened(surface: Surface, around: Surroundings, band: Band, must_stop: MustStop) -> Band:
     releases: dict[int, int] = {}
     path = None
     for _ in range(MOST_ROUNDS):

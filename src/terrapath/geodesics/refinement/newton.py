@@ -18,9 +18,12 @@ from numpy.typing import NDArray
 
 from ..._kernels.geodesics import newton as kernels
 from ..._kernels.geodesics.curves import fill_basis, solve_banded
+from ..._kernels.geodesics.paced import PacedStrand
+from ..._kernels.travel.priced import is_directed
 from ..._support.watching import MustStop, never
 from ...surface import Surface
 from ...validation import Array
+from .paced import paced_strand, softened, split_parameters
 
 # At a minimum the derivative of the energy, times the path's length on the plane, is at most this
 # share of the energy. It has no unit.
@@ -58,7 +61,7 @@ class Lifted(NamedTuple):
     polyline is shortest; then it is the square of the length.
     """
 
-    strand: kernels.Strand
+    strand: kernels.Strand | PacedStrand
     energy: float
 
     @property
@@ -75,6 +78,9 @@ class Lifted(NamedTuple):
 
 def lift(surface: Surface, points: Array) -> Lifted:
     """The polyline through points (m, 2), map units; beyond its edge a surface is extrapolated."""
+    if is_directed(surface.data):
+        paced = paced_strand(surface, points)
+        return Lifted(paced, kernels.lift(surface.data, paced))
     m, layers = len(points), len(surface.layers)
     strand = kernels.Strand(
         points,
@@ -97,7 +103,9 @@ class Step(NamedTuple):
     move: Array  # (m - 2, 2), map units; where not definite, a direction of negative curvature
 
 
-def newton_step(strand: kernels.Strand, projectors: Array, curvature: float = 1.0) -> Step:
+def newton_step(
+    strand: kernels.Strand | PacedStrand, projectors: Array, curvature: float = 1.0
+) -> Step:
     """The step after which the pull on every inner point is normal to the surface.
 
     projectors : (m - 2, 2, 2), onto the moves that each point is free to make.
@@ -172,13 +180,16 @@ def settle(surface: Surface, points: Array, must_stop: MustStop = never) -> Arra
 
     Where it must stop, the path so far.
     """
-    path, projectors = lift(surface, points), all_free(points)
-    for _ in range(MOST_STEPS):
-        found = None if must_stop() else lower(surface, path, projectors)
-        if found is None:
-            break
-        path = found
-    return path.points
+    projectors = all_free(points)
+    for ground in softened(surface) if is_directed(surface.data) else (surface,):
+        path = lift(ground, points)
+        for _ in range(MOST_STEPS):
+            found = None if must_stop() else lower(ground, path, projectors)
+            if found is None:
+                break
+            path = found
+        points = path.points
+    return points
 
 
 def resample(points: Array, pieces: int) -> Array:
@@ -233,16 +244,18 @@ def correct(surface: Surface, points: Array) -> Array | None:
     """The vertices (m, 2) of a polyline of least energy, moved onto the geodesic.
 
     Their error falls with the fourth power of their spacing. None where the surface is too rough
-    between the vertices for that.
+    between the vertices for that, and under a pace.
     """
-    if len(points) <= FEWEST_PIECES:
+    if len(points) <= FEWEST_PIECES or is_directed(surface.data):
         return None
     projectors = all_free(points)
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
     last = farthest_move(surface, length)
     points = points.copy()
     for _ in range(MOST_CORRECTIONS):
-        step = newton_step(_of_fourth_order(lift(surface, points).strand), projectors)
+        strand = lift(surface, points).strand
+        assert isinstance(strand, kernels.Strand)
+        step = newton_step(_of_fourth_order(strand), projectors)
         size = float(np.abs(step.move).max())
         if not step.definite or not size < last:
             return None
@@ -273,6 +286,8 @@ def placed_parameters(surface: Surface, curve: Curve, pieces: int, tolerance: fl
     The piece is too long by det h / h(u, u)^(3/2) c^2 d^3 / 24. pieces : of the curve; each is
     sampled.
     """
+    if is_directed(surface.data):
+        return split_parameters(surface, curve, pieces, tolerance, MOST_POINTS)
     t = np.linspace(0.0, 1.0, SAMPLES_PER_PIECE * pieces + 1)
     v, bend = curve(t, 1), curve(t, 2)
     speed, determinant = _measured(surface, curve(t), v)

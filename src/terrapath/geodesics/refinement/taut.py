@@ -27,6 +27,7 @@ REPEATED = 1e-10
 
 # Pieces of the polyline for each feature of the surface, stage by stage.
 PIECES_PER_FEATURE = (2.0, 8.0)
+PACED_PIECES_PER_FEATURE = (2.0, 8.0, 32.0)
 MOST_PIECES = 4096
 FEWEST_PIECES = 8  # of the path, and of each smooth stretch
 # A piece shorter than this share of a feature is taken as straight.
@@ -42,14 +43,15 @@ def taut_paths(
     is_near : is the one given nearly taut? Then it is not pulled in coarse pieces first.
     Where it must stop, the next one is as far as the path is pulled.
     """
-    surface, space = problem.surface, problem.free_space
+    surface, space = problem.priced, problem.free_space
     cleared = _cleared(space, points, must_stop)
     if cleared is None:
         return
     around, points = cleared
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
     band = Band.free(points)
-    for pieces in PIECES_PER_FEATURE[1 if is_near else 0 :]:
+    counts = PIECES_PER_FEATURE if problem.travel is None else PACED_PIECES_PER_FEATURE
+    for pieces in counts[1 if is_near else 0 :]:
         longest = max(surface.resolution / pieces, length / MOST_PIECES)
         longest = min(longest, length / FEWEST_PIECES)
         band = adopted(around, subdivided(band, longest))
