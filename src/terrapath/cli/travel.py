@@ -36,12 +36,14 @@ def travel_command(
     A travel model is what a metre costs in time or energy, uphill and downhill. Plan with it by
     `terrapath plan WHERE --travel MODEL`.
     """
-    from ..travel.registry import EXAMPLES, MODELS, by_name
+    from ..travel.registry import EXAMPLES, MODELS, by_name, plug_ins
 
     if model is None:
         if plot is not None:
             raise InputError(f"--plot {plot} needs a model: terrapath travel tobler --plot {plot}")
         _print_all([by_name(name, **EXAMPLES.get(name, {})) for name in MODELS])
+        for name, entry in plug_ins().items():
+            typer.echo(f"{name}, of {entry.value}")
         return ExitCode.SOLVED
     chosen = by_name(model, **dict(map(_option, options or [])))
     if plot is not None:
@@ -105,7 +107,8 @@ def _print_one(model: TravelModel) -> None:
     table = Table(box=None, pad_edge=False)
     for column in ("grade", "pace", "with switchbacks"):
         table.add_column(column, justify="right")
-    for grade in SHOWN:
+    low, high = model.grades if model.beyond == "refuse" else (-math.inf, math.inf)
+    for grade in (grade for grade in SHOWN if low <= grade <= high):
         raw = float(model.raw(grade))
         shown = f"{raw:.6g}" if math.isfinite(raw) else "-"
         table.add_row(f"{100 * grade:+.0f} %", shown, f"{float(model(grade)):.6g}")

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from difflib import get_close_matches
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from .energy import llobera_sluckin, minetti, pandolf
 from .model import TravelModel
 from .vehicles import vehicle
 from .walking import campbell, irmischer_clarke, langmuir, naismith, tobler
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 Maker = Callable[..., TravelModel]
 
@@ -31,6 +35,53 @@ MODELS: dict[str, Maker] = {maker.__name__: maker for maker in MAKERS}
 # What a list of all models shows of one that cannot be made without arguments.
 EXAMPLES: dict[str, Mapping[str, Any]] = {"vehicle": {"mass": 1000.0, "rolling_resistance": 0.05}}
 
+# Where installed packages announce models of their own: a name, and a function that makes one.
+PLUG_INS = "terrapath.travel"
+
+
+@cache
+def plug_ins() -> dict[str, EntryPoint]:
+    """The models of other packages by their names; none takes the name of one of ours."""
+    from importlib.metadata import entry_points
+
+    found = {entry.name.replace("-", "_"): entry for entry in entry_points(group=PLUG_INS)}
+    return {name: entry for name, entry in found.items() if name not in MODELS}
+
+
+def _of_plug_in(entry: EntryPoint) -> Maker:
+    """The function that an entry point names. Raises InputError where it cannot be used."""
+    try:
+        maker = entry.load()
+        inspect.signature(maker)
+    except Exception as error:  # another package may raise anything while it is imported
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(
+            f"travel={entry.name!r} of {entry.value} cannot be loaded: {reason:.200}; repair or "
+            "uninstall its package"
+        ) from None
+
+    def made(**options: Any) -> TravelModel:
+        model = maker(**options)
+        if not isinstance(model, TravelModel):
+            raise InputError(
+                f"travel={entry.name!r} of {entry.value} makes no travel model, but "
+                f"{type(model).__name__}; return one, as of tp.travel.from_function"
+            )
+        return model
+
+    made.__signature__ = inspect.signature(maker)  # type: ignore[attr-defined] # for its options
+    return made
+
+
+def _maker(name: str) -> Maker:
+    """What makes the model of a name. Raises InputError, with the nearest name, for none."""
+    key = name.replace("-", "_")
+    if key in MODELS:
+        return MODELS[key]
+    if key in plug_ins():
+        return _of_plug_in(plug_ins()[key])
+    raise InputError(f"travel={name!r} is not known; {_instead(name, [*MODELS, *plug_ins()])}")
+
 
 def by_name(name: str, **options: Any) -> TravelModel:
     """The travel model of this name, such as ``"tobler"``, made with these options.
@@ -38,9 +89,7 @@ def by_name(name: str, **options: Any) -> TravelModel:
     Raises InputError where the name or an option is not known, or an option is missing. The message
     names the nearest.
     """
-    maker = MODELS.get(str(name).replace("-", "_"))
-    if maker is None:
-        raise InputError(f"travel={name!r} is not known; {_instead(str(name), MODELS)}")
+    maker = _maker(str(name))
     parameters = inspect.signature(maker).parameters
     for option in options:
         if option not in parameters:
@@ -51,12 +100,14 @@ def by_name(name: str, **options: Any) -> TravelModel:
         if parameter.default is parameter.empty and parameter.name not in options
     ]
     if missing:
-        example = " ".join(f"{key}={value:g}" for key, value in EXAMPLES[maker.__name__].items())
-        raise InputError(f"{name} needs {' and '.join(missing)}, such as {example}")
+        values = EXAMPLES.get(str(name).replace("-", "_"), {})
+        example = " ".join(f"{key}={value:g}" for key, value in values.items())
+        such = f", such as {example}" if example else "; give a value to each"
+        raise InputError(f"{name} needs {' and '.join(missing)}{such}")
     return maker(**options)
 
 
-def _instead(given: str, known: Mapping[str, Any]) -> str:
+def _instead(given: str, known: Collection[str]) -> str:
     """The nearest of the known names, and all of them."""
     near = get_close_matches(given.lower(), known, n=1, cutoff=0.5)
     question = f"did you mean {near[0]}? " if near else ""
