@@ -204,9 +204,9 @@ def plan_row(name: str, how: str, problem: tp.Problem | None, picture: Path | No
     return [
         name,
         how,
-        f"{path.ground_length:,.1f} {path.ground_unit}",
+        f"{path.ground_length:,.1f} {path.ground_unit}".rstrip(),
         f"{path.climb:,.1f} / {path.descent:,.1f}",
-        f"{solution.value:,.1f} {solution.unit}",
+        f"{solution.value:,.1f} {solution.unit}".rstrip(),
         "" if gap is None else f"{gap:.2%}",
         f"{solution.seconds:.1f}",
     ]
@@ -232,20 +232,22 @@ def plans(made: RealMap, folder: Path, pictures: Path | None) -> Iterator[list[s
 
 def walked(heights: Path, start: Floats, goal: Floats, scratch: Path) -> Floats:
     """The route of GRASS's r.walk, knight's moves included, in the map's coordinates (m, 2)."""
-    out = scratch / "walk.csv"
-    flat, from_, to = "flat", ",".join(map(str, start)), ",".join(map(str, goal))
+    out, placed = scratch / "walk.csv", scratch / "placed.tif"
+    from_, to = ",".join(map(str, start)), ",".join(map(str, goal))
+    # GRASS wants some CRS in metres; the coordinates stay as they are.
+    run("gdal_translate", "-q", "-a_srs", "EPSG:32631", heights, placed)
     lines = [
-        f"r.in.gdal -o --q input={heights} output=dem",
+        f"r.in.gdal -o --q input={placed} output=dem",
         "g.region raster=dem",
-        f"r.mapcalc --q expression='{flat} = if(isnull(dem), null(), 0)'",
-        f"r.walk -k --q elevation=dem friction={flat} output=cost outdir=back "
+        "r.mapcalc --q expression='flat = if(isnull(dem), null(), 0)'",
+        f"r.walk -k --q elevation=dem friction=flat output=cost outdir=back "
         f"start_coordinates={from_}",
         f"r.path --q input=back format=degree vector_path=route start_coordinates={to}",
         f"v.out.ascii --q input=route format=standard output={out}",
     ]
     script = scratch / "walk.sh"
     script.write_text("set -e\n" + "\n".join(lines) + "\n", encoding="utf-8")
-    run("grass", "-c", heights, scratch / "grass", "-e")
+    run("grass", "-c", placed, scratch / "grass", "-e")
     run("grass", scratch / "grass" / "PERMANENT", "--exec", "bash", script)
     words = [line.split() for line in out.read_text(encoding="utf-8").splitlines()]
     points = [(float(w[0]), float(w[1])) for w in words if len(w) == 2 and _is_number(w[0])]
@@ -305,6 +307,7 @@ def tables(folder: Path, pictures: Path | None) -> Iterator[str]:
 
 def main(arguments: Sequence[str]) -> int:
     """Print the tables."""
+    warnings.simplefilter("ignore", tp.MapWarning)  # the documentation says what they say
     parser = argparse.ArgumentParser(prog="python -m benchmarks.real_maps", description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--pictures", type=Path)
