@@ -71,6 +71,38 @@ def test_start_and_goal_are_moved_no_farther_than_allowed_and_this_is_said():
         tp.Problem(FLAT, (5, 10), (15, 10), BOUNDS, [WALL], snap=-1)
 
 
+# A ring around a yard: the nearest free place to its inner part is in the yard, a pocket.
+RING = shapely.box(12, 8, 18, 14) - shapely.box(14, 10, 16, 12)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_an_end_is_not_left_in_a_pocket_where_ground_beyond_is_near_enough(turned):
+    ends = [(2, 10), (13.5, 11)]
+    with pytest.warns(tp.errors.SnapWarning) as told:
+        problem = tp.Problem(FLAT, *(ends[::-1] if turned else ends), BOUNDS, [RING], snap=2.0)
+    moved, kept = (problem.goal, problem.start)[:: -1 if turned else 1]
+    assert kept == (2.0, 10.0)
+    assert 11.9 < moved[0] < 12.0
+    assert not problem.is_unreachable
+    name = "start" if turned else "goal"
+    assert f"no path leads from there to the other end; {name} is moved on to" in str(
+        told[1].message
+    )
+
+
+def test_an_end_stays_in_a_pocket_where_nothing_beyond_is_near_enough():
+    with pytest.warns(tp.errors.SnapWarning) as told:
+        problem = tp.Problem(FLAT, (2, 10), (13.7, 11), BOUNDS, [RING], snap=1.0)
+    assert len(told) == 1
+    assert 14.0 < problem.goal[0] < 14.1
+    assert problem.is_unreachable
+
+
+def test_an_end_that_was_given_in_a_pocket_stays_there():
+    problem = tp.Problem(FLAT, (2, 10), (15, 11), BOUNDS, [RING], snap=9.0)
+    assert problem.goal == (15.0, 11.0)
+
+
 def test_what_is_suggested_is_free_and_near_enough():
     with pytest.raises(tp.InputError) as caught:
         tp.Problem(FLAT, (5.3, 10), (15, 10), BOUNDS, [WALL])

@@ -100,6 +100,8 @@ class Problem:
             self.surface = without_loans(surface, self.free_space)
         self.start = self.checked(start, "start")
         self.goal = self.start if goal is start else self.checked(goal, "goal")
+        if self.snap > 0.0:
+            self._leave_pockets(as_point(start, "start"), as_point(goal, "goal"))
 
     def _priced(self, travel: TravelModel | str) -> Pricing:
         from .pricing import Pricing
@@ -207,6 +209,27 @@ class Problem:
         far = f"{_rounded_up(distance):g} {unit}".rstrip()
         remedy = f"move it there, or let it be moved with a snap of {far}"
         raise BlockedError(f"{blocker}; the nearest free place is {there} away: {remedy}")
+
+    def _leave_pockets(self, start: Point, goal: Point) -> None:
+        """Move an end that was moved where no path leads to the other on, to where one may."""
+        from ..space.nearest import nearest_joined
+
+        for name, given in (("goal", goal), ("start", start)):
+            if getattr(self, name) == given or not self.is_unreachable:
+                continue
+
+            def is_joined(place: Point, name: str = name) -> bool:
+                ends = {"start": self.start, "goal": self.goal, name: place}
+                return not self.between_checked(**ends).is_unreachable
+
+            found = nearest_joined(self.free_space, given, self.snap, is_joined)
+            if found is not None:
+                setattr(self, name, found[0])
+                self.__dict__.pop("is_unreachable", None)
+                there = f"{self._show(found[0])}, {found[1]:.4g} {self.surface.unit}".rstrip()
+                tell(SnapWarning(
+                    f"no path leads from there to the other end; {name} is moved on to {there} away"
+                ))  # fmt: skip
 
     def between(self, start: PointLike, goal: PointLike) -> Problem:
         """The same problem with another start and goal, (x1, x2), map units.
