@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 
 import terrapath as tp
 from cost_rasters import CELL, Walker, cell_surface, random_costs, random_heights
+from terrapath.geodesics import cell_routes
 from terrapath.geodesics.cell_routes import polished, shortest_through_cells
 
 COUNT = 40
@@ -140,3 +141,21 @@ def test_a_bend_at_a_corner_does_not_hold_up_the_others():
 
     least = minimize_scalar(length, bounds=(0.0, 0.1), options={"xatol": 1e-12}).fun
     assert least * (1.0 - 1e-9) <= path.length <= least * (1.0 + 1e-7)
+
+
+@pytest.mark.parametrize("seed", [1, 3, 15])
+def test_on_large_maps_the_sides_of_those_cells_are_searched_that_matter(seed, monkeypatch):
+    problem, _ = random_problem(seed)
+    everywhere = polished(problem, shortest_through_cells(problem))
+    searched = []
+
+    def points_on(grid, cells, per_side, points_on=cell_routes._points_on):
+        searched.append(int(cells.sum()))
+        return points_on(grid, cells, per_side)
+
+    monkeypatch.setattr(cell_routes, "_points_on", points_on)
+    monkeypatch.setattr(cell_routes, "MANY_POINTS", 0)
+    monkeypatch.setattr(cell_routes, "MOST_POINTS", 3 * 900)
+    near = polished(problem, shortest_through_cells(problem))
+    assert 0 < searched[0] <= 900 < COUNT * COUNT
+    assert near.length <= 1.0005 * everywhere.length

@@ -8,6 +8,7 @@ as light does. ``shortest_through_cells`` searches points on the sides of all ce
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,19 +20,24 @@ from .._kernels.geodesics.visibility import UNSEEN, Search
 from .._kernels.surface.surfaces import Spline
 from .._support.watching import MustStop, never
 from ..problem import Path, Problem
+from ..space.lattice import Lattice, Spacing
 from ..surface import metric
 from ..surface.metric import curve_length, segment_lengths
 from ..validation import Array
 from .snell import ON_SIDE, obeying_snell
 
 Integers = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 
 # Points settled between two looks at whether to stop.
 CHUNK = 20_000
 
 # Points on each side, besides its ends, in a search of the whole map: as many as make no more than
-# this many points in all. Where even one makes more than the second number, there is no search.
+# this many points in all. Where even one makes more than the second number, only cells are searched
+# where a path leads that is at most so much longer than the shortest, by distance fields from both
+# ends; these have a node for each so many cells.
 POINTS_PER_SIDE, MANY_POINTS, MOST_POINTS = 3, 1_000_000, 6_000_000
+SLACKS, MOST_NODES = (0.06, 0.02, 0.005), 1_500_000
 
 # The distances of the points near a path, as shares of a side, in one search after the other.
 SHARES = (0.25, 0.1, 0.04, 0.015, 0.006)
@@ -144,12 +150,68 @@ def _sides_with(problem: Problem, grid: CellGrid, points: Array) -> kernels.Side
     )
 
 
-def _all_points(grid: CellGrid, per_side: int) -> Array:
-    """The corners of all cells and points between them (n, 2)."""
+def _points_on(grid: CellGrid, cells: Flags, per_side: int) -> Array:
+    """The corners of some cells (ny, nx) and points between them on their sides (n, 2)."""
     shares = np.arange(1, per_side + 1) / (per_side + 1)
-    between = [(at[:-1, None] + np.diff(at)[:, None] * shares).ravel() for at in (grid.x, grid.y)]
-    grids = (grid.x, grid.y), (between[0], grid.y), (grid.x, between[1])
-    return np.concatenate([np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2) for x, y in grids])
+    x, y = ((at[:-1, None] + np.diff(at)[:, None] * shares).ravel() for at in (grid.x, grid.y))
+    below_or_above, beside = (
+        np.logical_or(np.pad(cells, before), np.pad(cells, after))
+        for before, after in (
+            (((1, 0), (0, 0)), ((0, 1), (0, 0))),
+            (((0, 0), (1, 0)), ((0, 0), (0, 1))),
+        )
+    )
+    corners = np.pad(beside, ((1, 0), (0, 0))) | np.pad(beside, ((0, 1), (0, 0)))
+    chosen = (
+        (grid.x, grid.y, corners),
+        (x, grid.y, below_or_above.repeat(per_side, axis=1)),
+        (grid.x, y, beside.repeat(per_side, axis=0)),
+    )
+    return np.concatenate([np.stack(np.meshgrid(x, y), axis=-1)[held] for x, y, held in chosen])
+
+
+def _cells_between(problem: Problem, grid: CellGrid, must_stop: MustStop) -> Iterator[Flags]:
+    """Ever fewer cells (ny, nx) that paths lead through that are nearly the shortest, by fields."""
+    from ..distance.field import march_both
+    from ..distance.medium import Medium
+
+    size = math.sqrt(max(grid.costs.size / MOST_NODES, 1.0))
+    lattice = Lattice.spanning(problem.bounds, Spacing(*(size * grid.sides).tolist()))
+    medium = Medium(problem.surface, lattice, problem.free_space, must_stop)
+    one, other = march_both(medium, problem.start, problem.goal, watch=lambda _: must_stop())
+    through = one.values + other.values
+    rows, columns = (
+        np.clip(np.searchsorted(nodes, places) - 1, 0, len(nodes) - 2)
+        for nodes, places in ((lattice.y, _middles(grid.y)), (lattice.x, _middles(grid.x)))
+    )
+    corners = [
+        through[j : j + lattice.ny - 1, i : i + lattice.nx - 1] for j in (0, 1) for i in (0, 1)
+    ]
+    least = np.minimum.reduce(corners)[np.ix_(rows, columns)]
+    for slack in SLACKS:
+        yield np.asarray(least <= (1.0 + slack) * through.min())
+
+
+def _middles(places: Array) -> Array:
+    return np.asarray(0.5 * (places[1:] + places[:-1]))
+
+
+def _points_to_search(problem: Problem, grid: CellGrid, must_stop: MustStop) -> Array | None:
+    """Points on the sides of all cells, or where these are too many, of those that matter."""
+    if per_side := _most_per_side(grid.costs.size):
+        return _points_on(grid, np.ones(grid.costs.shape, bool), per_side)
+    for cells in _cells_between(problem, grid, must_stop):
+        if per_side := _most_per_side(int(np.count_nonzero(cells))):
+            return _points_on(grid, cells, per_side)
+    return None
+
+
+def _most_per_side(cells: int) -> int:
+    """How many points a side may have; 0 where there are too many cells."""
+    for per_side in range(POINTS_PER_SIDE, 0, -1):
+        if (1 + 2 * per_side) * cells <= (MANY_POINTS if per_side > 1 else MOST_POINTS):
+            return per_side
+    return 0
 
 
 def _search(problem: Problem, sides: kernels.Sides, must_stop: MustStop) -> Array | None:
@@ -179,18 +241,17 @@ def _search(problem: Problem, sides: kernels.Sides, must_stop: MustStop) -> Arra
 def shortest_through_cells(problem: Problem, must_stop: MustStop = never) -> Path | None:
     """The shortest path through a few points on each side of all cells.
 
-    None where costs are not constant in cells, where the map is too large, where it must stop, and
-    where obstacles leave no path through such points.
+    On a large map they are on the sides of those cells alone where a short path is likely. None
+    where costs are not constant in cells, where it must stop, and where obstacles leave no path
+    through such points.
     """
     grid = grid_of(problem)
     if grid is None:
         return None
-    per_side = POINTS_PER_SIDE
-    while per_side > 1 and (1 + 2 * per_side) * grid.costs.size > MANY_POINTS:
-        per_side -= 1
-    if (1 + 2 * per_side) * grid.costs.size > MOST_POINTS:
+    places = _points_to_search(problem, grid, must_stop)
+    if places is None or must_stop():
         return None
-    sides = _sides_with(problem, grid, _all_points(grid, per_side))
+    sides = _sides_with(problem, grid, places)
     points = _search(problem, sides, must_stop)
     return None if points is None else problem.path(points)
 
