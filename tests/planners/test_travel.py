@@ -1,6 +1,7 @@
 """Planners with a travel model: trees and grids that know the direction."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ TAKE = {
     "dijkstra": {"spacing": 25.0},
     "a-star": {"spacing": 25.0},
 }
-REFUSE = ("fast-marching", "optimal", "geodesic-traversal")
+REFUSE = ("fast-marching", "geodesic-traversal")
 WALL = shapely.box(480.0, 300.0, 520.0, 700.0)
 ENDS = (100.0, 150.0), (900.0, 850.0)
 
@@ -166,3 +167,30 @@ def test_refining_never_makes_a_path_dearer():
     better = tp.refine(problem, rough.path)
     assert better.value < 0.99 * rough.value
     assert problem.allows(better)
+
+
+@pytest.mark.parametrize("model", ["tobler", "regeneration"])
+def test_optimal_finds_the_way_round_a_wall_on_a_plane(model):
+    start, goal = (300.0, 480.0), (700.0, 520.0)
+    model = MODELS[model][0]()
+    problem = tp.Problem(plane(0.2, 0.1), start, goal, BOUNDS, [WALL], travel=model)
+    routes = []
+    for y in (300.0 - 1e-5, 700.0 + 1e-5):
+        stops = [start, (480.0 - 1e-5, y), (520.0 + 1e-5, y), goal]
+        routes.append(sum(problem.between(a, b).chord for a, b in pairwise(stops)))
+    solution = tp.plan(problem, "optimal", spacing=25.0)
+    size = solution.path.gauged
+    assert solution.value == pytest.approx(min(routes), abs=1e-7 * size)
+    assert solution.cost == solution.value
+    assert solution.lower_bound == pytest.approx(problem.chord, abs=1e-9 * size)
+    (other,) = solution.alternatives
+    assert other.value == pytest.approx(max(routes), abs=1e-7 * size)
+
+
+@pytest.mark.slow
+def test_optimal_is_as_good_as_the_best_of_the_others():
+    problem = over_hills(obstacles=[WALL], factor=2.0)
+    solution = tp.plan(problem, "optimal", spacing=20.0)
+    for name in ("rrt-star-r", "a-star"):
+        other = tp.plan(problem, name, refine=True, **TAKE[name])
+        assert solution.value <= other.value * (1.0 + 1e-4)

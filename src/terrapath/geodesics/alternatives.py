@@ -77,7 +77,7 @@ def alternatives(
 
 def shortest(routes: Iterable[Path], count: int) -> tuple[Path, ...]:
     """The ``count`` shortest of the routes, shortest first."""
-    return tuple(sorted(routes, key=lambda route: route.length)[:count])
+    return tuple(sorted(routes, key=lambda route: route.gauged)[:count])
 
 
 def routes_of_fields(
@@ -193,7 +193,7 @@ def is_same(problem: Problem, a: Path, b: Path) -> bool:
     side = problem.bounds.side
     if _stay_together(a, b, SAME_PLACE * side):
         return True
-    alike = abs(a.length - b.length) <= SAME_LENGTH * max(a.length, b.length)
+    alike = abs(a.gauged - b.gauged) <= SAME_LENGTH * max(a.gauged, b.gauged)
     return alike and _stay_together(a, b, NEIGHBOURHOOD * side)
 
 

@@ -14,7 +14,7 @@ from ..space.lattice import Lattice, Spacing, as_spacing
 from ..validation import require_positive
 
 # The planners that take a travel model.
-TAKES_TRAVEL = "choose rrt-star-r, rrt-star, rrt, dijkstra or a-star"
+TAKES_TRAVEL = "choose optimal, rrt-star-r, rrt-star, rrt, dijkstra or a-star"
 
 # Why a search was not needed: it is proven that there is no path.
 SEPARATED = "start and goal lie in different parts of the free space"

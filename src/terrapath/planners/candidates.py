@@ -53,7 +53,7 @@ class Candidates:
     ) -> None:
         self.problem, self.stopper = problem, stopper
         self.count, self.spacing = count, spacing
-        self.is_rough = is_rough(problem.surface, problem.bounds)
+        self.is_rough = is_rough(problem.priced, problem.bounds)
         first = next(lattices(problem, spacing))
         self.samples, self.total = 0, 2 * first.nx * first.ny
         self.direct: Path | None = None
@@ -69,9 +69,9 @@ class Candidates:
 
     @property
     def best(self) -> float:
-        """The length of the best path so far, map units."""
+        """The length of the best path so far, map units; under a pace what it costs, gauged."""
         known = self.found if self.direct is None else [*self.found, self.direct]
-        return min((path.length for path in known), default=math.inf)
+        return min((path.gauged for path in known), default=math.inf)
 
     @property
     def rival(self) -> float:
@@ -81,12 +81,12 @@ class Candidates:
         """
         if not self.found or (len(self.found) < self.count and not self.is_rough):
             return math.inf
-        return self.shortest.length
+        return self.shortest.gauged
 
     @property
     def shortest(self) -> Path:
         """The shortest of the routes that are refined."""
-        return min(self.found, key=lambda route: route.length)
+        return min(self.found, key=lambda route: route.gauged)
 
     def must_stop(self, settled: int = 0) -> bool:
         """Show the progress; must the run stop? settled : nodes of the search in hand."""
@@ -94,7 +94,7 @@ class Candidates:
             self.samples + settled,
             max(self.total, self.samples + settled),
             self.stopper.seconds,
-            self.best,
+            self.best + self.problem.taken_off,
             stage=self.trying,
         )
         return self.stopper.must_stop(progress)
@@ -117,6 +117,9 @@ class Candidates:
         What is quick comes first, then what gains most for its time.
         """
         yield "trying the straight line", self.try_straight_line
+        if self.problem.travel is not None:
+            yield from self.searches_under_a_pace()
+            return
         if self.problem.surface.cost_cells is not None:
             yield "trying the sides of cells", self.try_sides
             yield "trying A*", partial(self.try_planner, AStar(neighbours=NEIGHBOURS[0]))
@@ -134,6 +137,19 @@ class Candidates:
             what = f"trying A* with {neighbours} neighbours"
             yield what, partial(self.try_planner, AStar(neighbours=neighbours))
         yield "trying a tree", partial(self.try_planner, RRTStar())
+
+    def searches_under_a_pace(self) -> Iterator[tuple[str, Callable[[], object]]]:
+        """Those that know the direction, on lattices of two spacings."""
+        for spacing in (
+            self.spacing,
+            0.5 * min(next(lattices(self.problem, self.spacing)).spacing),
+        ):
+            for neighbours in NEIGHBOURS:
+                planner = AStar(neighbours=neighbours, spacing=spacing)
+                what = f"trying A* with {neighbours} neighbours"
+                yield what, partial(self.try_planner, planner)
+        yield "trying a tree", partial(self.try_planner, RRTStar())
+        yield REFINING, self.polish
 
     # Searches
 
@@ -244,7 +260,7 @@ class Candidates:
             path = refine(self.problem, path, must_stop=self.stopper.is_late, rival=rival)
         except Exception as error:
             self.failures.append(error)
-        if path.length <= rival:
+        if path.gauged <= rival:
             self.keep(path)
 
     def polish(self) -> None:
@@ -286,7 +302,7 @@ class Candidates:
 
     def keep_unrefined(self, path: Path) -> None:
         """Keep a path, for what is returned if nothing better comes, where it is the shortest."""
-        if path.length < self.best and self.problem.allows(path):
+        if path.gauged < self.best and self.problem.allows(path):
             self.direct = path
 
     def keep(self, route: Path) -> None:
@@ -295,7 +311,7 @@ class Candidates:
             return
         for k, other in enumerate(self.found):
             if is_same(self.problem, route, other):
-                if route.length < other.length:
+                if route.gauged < other.gauged:
                     self.found[k] = route
                 return
         self.found.append(route)

@@ -36,7 +36,9 @@ class Optimal:
     obstacles, and the routes of the distance fields from both ends. Where the fields leave a
     doubt, on rough ground and among obstacles, fields on ever finer lattices follow, A* with 32, 16
     and 8 neighbours, and a tree; where costs are in cells, instead, the sides of cells. All but the
-    straight line are refined. The route from a start to a goal is the same as back.
+    straight line are refined. The route from a start to a goal is the same as back. With a travel
+    model the candidates are those of A*, on two lattices with 32, 16 and 8 neighbours, and of a
+    tree, and the lower bound is the chord.
 
     ``stopped_by`` tells whether the gap was met. ``unrefined`` is the shortest path before
     refinement; it is also the path returned where the run ends before a route was refined.
@@ -70,7 +72,7 @@ class Optimal:
         time_limit : seconds for this call; the lower of it and the option counts.
         Ctrl-C, too, ends the search, with the best path and the best bound so far.
         """
-        if (known := answer_without_search(problem, self.name)) is not None:
+        if (known := answer_without_search(problem, self.name, takes_travel=True)) is not None:
             return known
         limit = least_limit(self.time_limit, time_limit)
         return _Run(self, problem, callback, limit).solve()
@@ -89,7 +91,7 @@ class _Run:
         self.planner, self.given = planner, problem
         self.stopper, self.time_limit = Stopper(callback, before_proof(time_limit)), time_limit
         # One direction is solved, so that the other has the same answer.
-        self.is_reversed = problem.goal < problem.start
+        self.is_reversed = problem.goal < problem.start and problem.travel is None
         if self.is_reversed:
             problem = problem.between_checked(problem.goal, problem.start)
         self.candidates = Candidates(problem, self.stopper, planner.routes, planner.spacing)
@@ -120,7 +122,7 @@ class _Run:
     def answer(self) -> Solution:
         """What was found, without a lower bound."""
         known, direct = self.candidates.found, self.candidates.direct
-        if direct is not None and all(route.length > direct.length for route in known):
+        if direct is not None and all(route.gauged > direct.gauged for route in known):
             known, direct = [direct, *known], None  # it could not be refined, or not yet
         routes = [self.directed(route) for route in shortest(known, self.planner.routes)]
         path = routes[0] if routes else None
@@ -129,7 +131,7 @@ class _Run:
             planner=self.planner.name,
             status=status_of(path, self.stopper.stopped_by),
             path=path,
-            cost=None if path is None else path.length,
+            cost=None if path is None else path.value,
             seconds=self.stopper.seconds,
             samples=self.candidates.samples,
             stopped_by=self.stopper.stopped_by or "no path between the nodes",
@@ -160,4 +162,6 @@ class _Run:
             return "gap met"
         if self.stopper.stopped_by:
             return self.stopper.stopped_by
+        if self.given.travel is not None:
+            return "all searches are done"
         return "exact on flat ground" if self.candidates.is_exact else "finest lattice"

@@ -139,13 +139,19 @@ def chord_through(surface: Surface, points: npt.ArrayLike) -> float:
     return float(chord(surface, array[:-1], array[1:]).sum())
 
 
-def segment_lengths(surface: Surface, a: npt.ArrayLike, b: npt.ArrayLike) -> Array:
+def segment_lengths(
+    surface: Surface,
+    a: npt.ArrayLike,
+    b: npt.ArrayLike,
+    tolerance: float = QUADRATURE_TOLERANCE,
+) -> Array:
     """True lengths of the segments a-b under h, by adaptive quadrature to 1e-9 relative.
 
-    a, b : (..., 2), map units. Returns (...), map units. Source: paper, equation (3).
+    a, b : (..., 2), map units. tolerance : by which two rules for a piece may differ, relative.
+    Returns (...), map units. Source: paper, equation (3).
     """
     longest = FEATURES_PER_PIECE * surface.resolution
-    return _measure(lengths.fill_segment_lengths, surface, a, b, longest, QUADRATURE_TOLERANCE)
+    return _measure(lengths.fill_segment_lengths, surface, a, b, longest, tolerance)
 
 
 def curve_length(surface: Surface, points: npt.ArrayLike) -> float:

@@ -19,6 +19,8 @@ WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 # Beside a kink each piece of a polyline costs more in proportion to its size. So many points as a
 # smooth pace needs would not do, and are not asked for.
 LEAST_TOLERANCE = 1e-6
+# Pieces are measured this precisely, as a share, to see what halving them saves.
+MEASURED = 1e-9
 # In each round the pieces are halved that make up this share of what halving all would gain.
 SHARE_OF_GAIN, MOST_ROUNDS = 0.9, 12
 
@@ -96,8 +98,10 @@ def split_parameters(
     for _ in range(MOST_ROUNDS):
         between = 0.5 * (t[1:] + t[:-1])
         a, b, middle = curve(t[:-1]), curve(t[1:]), curve(between)
-        whole = segment_lengths(surface, a, b)
-        halves = segment_lengths(surface, a, middle) + segment_lengths(surface, middle, b)
+        whole, *parts = (
+            segment_lengths(surface, *ends, MEASURED) for ends in ((a, b), (a, middle), (middle, b))
+        )
+        halves = parts[0] + parts[1]
         gains = np.maximum(whole - halves, 0.0)
         if gains.sum() <= max(tolerance, LEAST_TOLERANCE) * halves.sum() or len(t) > most:
             break
