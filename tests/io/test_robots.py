@@ -195,6 +195,8 @@ def test_a_heightmap_is_checked(tmp_path):
             tp.read_surface(path, height_range=wrong)
     with pytest.raises(tp.InputError, match="cell_size"):
         tp.read_surface(path, cell_size=0.0, height_range=(0, 1))
+    with pytest.warns(tp.MapWarning, match=r"1 by 1; give their side by --cell-size"):
+        assert tp.read_surface(path, height_range=(0, 1)).bounds.width == 8.0
 
 
 def test_a_map_may_be_a_plane_of_its_own():

@@ -81,6 +81,12 @@ def test_the_title_tells_length_and_samples(solution):
     assert "2,000 samples" in title
 
 
+def test_the_title_of_a_straight_path_says_that_it_is_one():
+    flat = tp.Problem(tp.Surface.from_grid(np.zeros((9, 9)), *2 * [np.arange(9.0)]), (1, 1), (7, 6))
+    title = draw_route(made_up(flat, [flat.start, flat.goal])).get_suptitle()
+    assert "length 7.8102 (as the straight line)" in title
+
+
 def test_the_title_tells_the_bound_and_that_a_path_is_refined(solution, problem):
     assert "\n" not in draw_route(solution).get_suptitle()
     refined = tp.Path(problem.surface, solution.path.points[::2])

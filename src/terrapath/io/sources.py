@@ -297,12 +297,14 @@ class Unsaid:
         if self.cell_size is not None:
             band = _with_cells(band, self.cell_size)
         if self.height_range is not None:
+            _tell_of_cells(band, self.cell_size)
             band = _stretched(band, *self.height_range)
         elif band.largest == 255 and not (band.unit or self.height_unit):
             tell(MapWarning(
                 f"{band.label} holds 8-bit numbers without a unit, as pictures and hillshades do, "
                 "and is taken as heights from 0 to 255; give the elevation model if it is none, "
-                "--height-range LOW,HIGH for a heightmap, or --height-unit m if these are heights"
+                "--height-range LOW,HIGH and --cell-size for a heightmap, or --height-unit m if "
+                "these are heights"
             ))  # fmt: skip
         return _with_unit(band, self.height_unit) if self.height_unit else band
 
@@ -317,6 +319,15 @@ def _as_range(given: tuple[float, float]) -> tuple[float, float]:
             f"height_range=({low:g}, {high:g}) is not two finite numbers, the lower one first"
         )
     return low, high
+
+
+def _tell_of_cells(band: Band, size: float | None) -> None:
+    """Tell of a picture of heights whose cells nobody gave a size."""
+    if size is None and not band.is_placed:
+        tell(MapWarning(
+            f"{band.label} does not say how wide its cells are, and they are taken to be 1 by 1; "
+            "give their side by --cell-size, in the unit of the heights"
+        ))  # fmt: skip
 
 
 def _with_cells(band: Band, size: float) -> Band:

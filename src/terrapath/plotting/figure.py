@@ -29,6 +29,7 @@ PANEL_WIDTH = 5.4  # inches
 FIELD_WIDTH = 7.0
 # Letters in a line of a title that fit into the width of a map and of a profile.
 MAP_LETTERS, PROFILE_LETTERS = 150, 100
+LEAST_SHARE = 5e-4  # of which a title says how much it is
 FORMATS = (".png", ".svg", ".pdf", ".jpg")
 
 
@@ -47,10 +48,8 @@ def _lines(solution: Solution) -> Iterator[str]:
     straight = solution.straight_value
     saved = 1.0 - value / straight if straight else 0.0
     less, more = ("less", "more") if solution.is_weighted else ("shorter", "longer")
-    against = (
-        f"{100.0 * abs(saved):.1f} % {less if saved >= 0.0 else more} than the "
-        f"{straight_name(solution)}"
-    )
+    share = f"{100.0 * abs(saved):.1f} % {less if saved >= 0.0 else more} than"
+    against = f"{share if abs(saved) >= LEAST_SHARE else 'as'} the {straight_name(solution)}"
     refined = "" if solution.unrefined is None else ", refined"
     yield f"{name}{solution.planner}{refined}, {lengths_in_words(solution)} ({against}), {samples}"
     if solution.lower_bound is None or solution.gap is None:
