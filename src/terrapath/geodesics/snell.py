@@ -19,8 +19,9 @@ STEP = 1e-4
 FARTHEST = 3.0
 # Steps of Newton's method, and how often one is halved.
 MOST_STEPS, MOST_HALVINGS = 20, 8
-# It ends where a step shortens the path by no more than this share.
-GAIN = 1e-14
+# It ends where a step shortens the path by no more than this share; one that moves bends one by one
+# gains little, over and over, and ends it earlier.
+GAIN, GAIN_ALONE = 1e-14, 1e-10
 # Places this near to a side lie on it, as a share of the side. Bends are put on sides to rounding,
 # so this is narrower than the kernels' ``ON_SIDE``, by which costs are read: a bend that may move
 # along a side has the lower cost there.
@@ -40,14 +41,15 @@ def obeying_snell(surface: Surface, x: Array, y: Array, points: Array, first: in
     length = curve_length(surface, points)
     for _ in range(MOST_STEPS):
         step = _newton_step(surface, points, along)
-        taken = _together(surface, points, along, step, low, high, length)
+        taken, least = _together(surface, points, along, step, low, high, length), GAIN
         if taken is None:
+            least = GAIN_ALONE
             # A bend at a corner, where the length is not smooth, must not hold up the others.
             taken = _one_by_one(surface, points, along, step, low, high)
         points, low, high = points + along * taken[:, None], low - taken, high - taken
         shorter = curve_length(surface, points)
         gain, length = length - shorter, shorter
-        if gain <= GAIN * length:
+        if gain <= least * length:
             break
     return points
 
