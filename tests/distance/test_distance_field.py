@@ -86,7 +86,7 @@ def test_a_slope_of_a_hundred():
     field = tp.distance_field(steep, (1.0, 1.0), spacing=0.1)
     for goal in ((9.0, 9.0), (1.0, 9.0), (1.5, 4.0)):
         exact = math.hypot(math.hypot(1.0, 100.0) * (goal[0] - 1.0), goal[1] - 1.0)
-        assert float(field.at(goal)) == pytest.approx(exact, rel=1e-2)
+        assert float(field.at(goal)) == pytest.approx(exact, rel=2e-3)
 
 
 # Obstacles
@@ -280,7 +280,7 @@ def test_a_field_is_between_the_chord_and_a_walk_over_its_nodes(name, weight):
         assert path.length >= (1.0 - 1e-9) * tp.chord(surface, [field.source], [goal])[0]
 
 
-@pytest.mark.parametrize("slope", [0.0, 1.0, 10.0, 30.0, 100.0, 1e4, 1e5])
+@pytest.mark.parametrize("slope", [0.0, 1.0, 10.0, 30.0, 100.0, 300.0, 1e3, 1e4, 1e5])
 @pytest.mark.parametrize("angle", [math.atan2(0.8, 0.6), 0.0, 0.3, 1.5])
 @pytest.mark.parametrize("source", [(155.0, 305.0), (158.3, 301.7)])
 def test_planes_of_any_slope(slope, angle, source):
@@ -296,8 +296,9 @@ def test_planes_of_any_slope(slope, angle, source):
     elif slope <= 10.0:
         assert excess.max() <= 1e-3
     else:  # nodes level with the source follow from others that are farther
-        assert np.percentile(excess, 95.0) <= 4e-3
-        assert excess.max() <= 0.08
+        assert np.percentile(excess, 95.0) <= 1e-5
+        assert np.percentile(excess, 99.0) <= 5e-3
+        assert excess.max() <= 0.03
 
 
 @pytest.mark.parametrize(

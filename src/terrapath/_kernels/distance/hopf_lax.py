@@ -48,11 +48,12 @@ def queue_up(front, state, n, value):
 def settle(medium, state, source, member, value):
     """Give a member of the quartet its value."""
     known, node = value_at(state, member.n), node_at(state, member.n)
-    known.u = value
     # At the source itself tau has its limit, the cost there.
-    known.tau = source.cost
+    known.u, known.tau = value, source.cost
     if member.x * member.x + member.y * member.y > AT_SOURCE * AT_SOURCE:
-        known.tau = value / chord_of(medium, source, member)
+        chord = chord_of(medium, source, member)
+        known.u = max(value, medium.ground.floor * chord)  # rounding may be below it
+        known.tau = known.u / chord
     node.times = min(int(node.times) + 1, MOST_TIMES)
 
 

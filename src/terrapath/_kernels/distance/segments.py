@@ -123,11 +123,38 @@ def place_of_least(a, s):
 
 
 @inner_kernel
+def place_unfolded(a, s):
+    """The t of the place where the straight line from the source to the node crosses a segment,
+    when its sides are unfolded into one plane; 0 where that is its beginning.
+
+    Where the angle is nearly flat the value has a sharp minimum, which Newton's method misses from
+    afar. On planes it is here.
+    """
+    at_node, at_source = 0.0 - s.ae / s.ee, 0.0 - s.se / s.ee
+    near = sqrt(larger(a.aa - s.ae * s.ae / s.ee, 0.0))
+    far = sqrt(larger(a.ss - s.se * s.se / s.ee, 0.0))
+    t = (at_node * far + at_source * near) / (near + far + TINY)
+    t = smaller(larger(t, 0.0), 1.0)
+    return where_above(t, LEAST_T, t, 0.0)
+
+
+@inner_kernel
 def is_wide(a, s):
     """1 where the angle between the edges to both ends of a segment is too wide, else 0."""
     both = larger(a.aa + s.ae, 0.0)
     limit = ACUTE * ACUTE * a.aa * (a.aa + 2.0 * s.ae + s.ee)
     return where_above(limit, both * both, 1.0, four(0.0, 0.0, 0.0, 0.0))
+
+
+@inner_kernel
+def best_place(a, s):
+    """The t of the place on a segment that offers least, on wide ones too; 0 at its beginning."""
+    t, wide = place_of_least(a, s), is_wide(a, s)
+    if any_above(wide, 0.0):
+        straight = place_unfolded(a, s)
+        gain = value_on(a, s, t) - value_on(a, s, straight)
+        t = where_above(where_above(wide, 0.0, gain, 0.0), 0.0, straight, t)
+    return t
 
 
 @inner_kernel

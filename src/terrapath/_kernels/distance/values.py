@@ -42,11 +42,11 @@ from .quartet import (
 from .ray import ray
 from .segments import (
     Segment,
+    best_place,
     fall_along,
     first_where_above,
     is_wide,
     near_on,
-    place_of_least,
     size,
     value_on,
 )
@@ -69,11 +69,11 @@ def better_side(end, right, left):
     """The places of the least values on the segments on both sides of four edges."""
     fall_r, fall_l = fall_along(end, right), fall_along(end, left)
     segment = first_where_above(fall_r, 0.0, right, left)
-    t = where_above(fall_r + fall_l, 0.0, place_of_least(end, segment), 0.0)
+    t = where_above(fall_r + fall_l, 0.0, best_place(end, segment), 0.0)
     on_left = where_above(fall_r, 0.0, 0.0, fall_l)
     both = where_above(fall_r, 0.0, fall_l, 0.0)
     if any_above(both, 0.0):
-        other = where_above(both, 0.0, place_of_least(end, left), 0.0)
+        other = where_above(both, 0.0, best_place(end, left), 0.0)
         gain = value_on(end, segment, t) - value_on(end, left, other)
         gain = where_above(other, 0.0, where_above(t, 0.0, gain, 1.0), 0.0)
         segment, t = first_where_above(gain, 0.0, left, segment), where_above(gain, 0.0, other, t)
@@ -263,7 +263,7 @@ def value_beside(medium, state, source, n, k):
     chosen = where_above(fall_along(end, segment), 0.0, is_wide(end, segment), 0.0)
     if not (chosen[0] > 0.0 or chosen[1] > 0.0):
         return math.inf
-    t = where_above(chosen, 0.0, place_of_least(end, segment), 0.0)
+    t = where_above(chosen, 0.0, best_place(end, segment), 0.0)
     value = values_through(medium, state, source, quartet, 2, end, Choice(segment, t, t))
     apart = size(value - value_on(end, segment, t))
     step = sqrt(near_on(end, segment, t))
