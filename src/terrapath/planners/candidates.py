@@ -53,7 +53,7 @@ class Candidates:
     ) -> None:
         self.problem, self.stopper = problem, stopper
         self.count, self.spacing = count, spacing
-        self.is_rough = is_rough(problem.priced, problem.bounds)
+        self.is_rough = is_rough(problem.relief, problem.bounds)
         first = next(lattices(problem, spacing))
         self.samples, self.total = 0, 2 * first.nx * first.ny
         self.direct: Path | None = None

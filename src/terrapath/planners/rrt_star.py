@@ -65,7 +65,7 @@ def _kernel_options(problem: Problem, options: TreeOptions) -> trees.Options:
     least = 2.0 * math.sqrt(1.5 / math.pi)
     step, rule = options.step or default_step(problem), LINE_R
     if options.panel is None and options.informed and options.riemannian:
-        rule = edge_rule(problem.priced, bounds, min(step, default_step(problem)))
+        rule = edge_rule(problem.relief, bounds, min(step, default_step(problem)))
     return trees.Options(
         *bounds,
         *problem.start,
@@ -235,7 +235,7 @@ def _first_path(problem: Problem, options: TreeOptions, callback: Callback | Non
         return FirstPath(straight, time.perf_counter() - started)
     from .first_path import path_over_lattices
 
-    on_rough = options.riemannian and is_rough(problem.priced, problem.bounds)
+    on_rough = options.riemannian and is_rough(problem.relief, problem.bounds)
     return path_over_lattices(problem, options, callback, straight, on_rough)
 
 

@@ -124,6 +124,11 @@ class Problem:
         return self.surface if self.pricing is None else self.pricing.surface
 
     @property
+    def relief(self) -> Surface:
+        """The surface that says how rough the ground is; kinks of a pace do not count."""
+        return self.surface if self.pricing is None else self.pricing.ground.surface
+
+    @property
     def unit(self) -> str:
         """The unit of what is minimised."""
         return value_unit(self.surface) if self.pricing is None else self.pricing.model.unit
