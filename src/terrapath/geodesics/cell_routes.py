@@ -44,6 +44,9 @@ SHARES = (0.25, 0.1, 0.04, 0.015, 0.006)
 # Searches reach so many cells to either side: the first ones, and the others. One follows another
 # of the same distances while the path gets shorter by more than this share, and at most so often.
 REACHES, GAIN, MOST_SEARCHES = (3, 1), 1e-6, 50
+# On rough ground a path gets more bends with each search, and these more points. Searches with more
+# than so many times the points of the first one gain 1e-5 and take most of the time.
+CROWD = 2.0
 # All that is repeated, too, because a path without its needless bends can move as a whole.
 MOST_CYCLES = 10
 # So many points lie on either side of a bend.
@@ -278,7 +281,7 @@ def polished(problem: Problem, path: Path, must_stop: MustStop = never) -> Path:
 
 def _polished_once(problem: Problem, grid: CellGrid, path: Path, must_stop: MustStop) -> Path:
     """A path after searches near it, Newton's method, and without bends that do nothing."""
-    best = path
+    best, most = path, math.inf
     for share in SHARES:
         reach = REACHES[0] if share == SHARES[0] else REACHES[1]
         for _ in range(MOST_SEARCHES):
@@ -286,6 +289,9 @@ def _polished_once(problem: Problem, grid: CellGrid, path: Path, must_stop: Must
                 return best
             points, before = _crossings(grid, best.points), best.length
             sides = _sides_with(problem, grid, _points_near(grid, points, share, reach))
+            if len(sides.points) > most:
+                break
+            most = min(most, CROWD * len(sides.points))
             best = _shorter(problem, best, _search(problem, sides, must_stop))
             if best.length >= before * (1.0 - GAIN):
                 break

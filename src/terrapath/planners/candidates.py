@@ -106,9 +106,12 @@ class Candidates:
             search()
             if self.is_sure or self.must_stop():
                 break
-        if self.is_rough and not self.stopper.stopped_by:
-            self.trying = REFINING
+        if self.stopper.stopped_by:
+            return
+        self.trying = REFINING
+        if self.is_rough or self.is_through_cells:
             self.polish()
+        if self.is_rough:
             self.try_other_routes()
 
     def searches(self) -> Iterator[tuple[str, Callable[[], object]]]:

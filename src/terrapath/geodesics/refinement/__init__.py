@@ -94,7 +94,8 @@ def refine(
         from ..cell_routes import polished
 
         shorter = _shortened(problem, given, must_stop, rival) if is_hard else given
-        return polished(problem, shorter, must_stop)
+        is_worth_it = not is_hard or shorter.length * (1.0 - LITTLE) <= rival
+        return polished(problem, shorter, must_stop) if is_worth_it else shorter
     if is_hard:
         return _refined_on_rough_ground(problem, given, tolerance, must_stop, rival)
     best, is_pulled = _pulled(problem, given, tolerance, must_stop)
