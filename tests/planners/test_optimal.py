@@ -272,6 +272,7 @@ def rough_problem(seed, weight=10.0):
     return tp.Problem(surface, start, goal)
 
 
+@pytest.mark.filterwarnings("ignore:the path of fast-marching")
 @pytest.mark.parametrize("seed", mostly_slow(range(6), quick=2))
 def test_on_rough_ground_it_is_beaten_by_no_planner_and_the_same_back(seed):
     problem = rough_problem(seed)
@@ -285,6 +286,26 @@ def test_on_rough_ground_it_is_beaten_by_no_planner_and_the_same_back(seed):
         found = tp.plan(problem, name, refine=True, **options)
         assert best.length <= found.length * (1.0 + 1e-6), name
     assert best.length <= problem.straight_length
+
+
+@pytest.mark.parametrize("weight", [10.0, 1e6])
+def test_fast_marching_warns_where_its_nodes_do_not_show_the_ground(weight):
+    with pytest.warns(tp.GroundWarning, match="longer than its field says.*optimal looks"):
+        tp.plan(rough_problem(0, weight), "fast-marching")
+    tp.plan(rough_problem(0, 0.1), "fast-marching")  # warnings are errors
+
+
+def test_a_fifth_of_the_time_is_kept_for_the_proof(monkeypatch):
+    limits = []
+    search = candidates.Candidates.search
+
+    def noted(self):
+        limits.append(self.stopper.time_limit)
+        search(self)
+
+    monkeypatch.setattr(candidates.Candidates, "search", noted)
+    tp.plan(BESIDE_A_DISC, "optimal", spacing=0.2, target_gap=10.0, time_limit=1000.0)
+    assert limits == [800.0]
 
 
 def test_among_boxes_on_flat_ground_it_is_exact():

@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 
 from .._support.watching import never, stop_after
+from ..errors import told_to
 from ..problem import Path, Problem
 from .base import (
     INTERRUPT,
@@ -86,7 +87,8 @@ def _shorter(problem: Problem, paths: list[Path], time_limit: float | None) -> P
     must_stop = never if time_limit is None else stop_after(time_limit)
     found = [*paths]
     if problem.travel is None:
-        field = FastMarching().solve(problem, time_limit=time_limit)
+        with told_to(lambda _: None):  # it is one of several paths
+            field = FastMarching().solve(problem, time_limit=time_limit)
         found += [] if field.path is None else [field.path]
     for stages, count in ((COARSE, len(found)), (STAGES[2:3], 1)):
         found.sort(key=lambda path: path.gauged)
