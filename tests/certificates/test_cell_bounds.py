@@ -16,6 +16,7 @@ from terrapath._kernels.certificates.surface_models import Box
 from terrapath.certificates.certificate import certify
 from terrapath.certificates.claims import Claim, Core, cell_needs
 from terrapath.certificates.multigrid import Multigrid
+from terrapath.certificates.search import certificates
 from terrapath.errors import CertificateError
 from terrapath.space.lattice import Lattice
 from terrapath.surface import Mask
@@ -52,6 +53,17 @@ def interpolated(values, s, t):
     if s + t <= 1.0:
         return a + s * falling[0][0] + t * falling[0][1], falling[0]
     return d - (1.0 - s) * falling[1][0] - (1.0 - t) * falling[1][1], falling[1]
+
+
+def test_what_a_search_found_before_it_had_to_stop_is_proven():
+    problem, _ = problem_of(0)
+    looks = iter(range(60))
+    stopped = certificates(problem, must_stop=lambda: next(looks, None) is None)
+    (found,) = stopped
+    assert next(looks, None) is None  # it was stopped
+    whole = tp.lower_bound(problem).value
+    chord = float(tp.chord(problem.surface, problem.start, problem.goal))
+    assert chord * 1.2 < found.value <= whole * (1.0 + 1e-3)
 
 
 @pytest.mark.parametrize("steep", [0.0, 1.0])

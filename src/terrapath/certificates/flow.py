@@ -17,7 +17,7 @@ import numpy as np
 
 from .._kernels.certificates import flow as kernels
 from .._kernels.surface.surfaces import Spline
-from .._support.watching import MustStop
+from .._support.watching import MustStop, never
 from ..problem import Problem
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
@@ -259,13 +259,13 @@ class FlowSearch:
             goal_core=_core(problem.goal, lattice),
         )
 
-    def certify(self) -> Certificate:
+    def certify(self, must_end: MustStop = never) -> Certificate:
         """The certificate that the best u makes."""
         kernels.choose_diagonals(self.best_u, self._ratio, self.rising)
         begin = float((self._weights(self.problem.start) * self.best_u).sum())
         claim = self._claim(self.best_u - begin)
-        needs = cell_needs(self.problem, claim, FLAT_ENOUGH, self.must_stop)
-        return certify(self.problem, claim, needs, self.must_stop)
+        needs = cell_needs(self.problem, claim, FLAT_ENOUGH, must_end)
+        return certify(self.problem, claim, needs, must_end)
 
 
 def _into_obstacles(values: Array, costs: Array, lattice: Lattice) -> Array:
@@ -327,7 +327,12 @@ def _roots(tensors: Array) -> Array:
 
 
 def cell_certificates(
-    problem: Problem, window: Bounds, length: float, target_gap: float, must_stop: MustStop
+    problem: Problem,
+    window: Bounds,
+    length: float,
+    target_gap: float,
+    must_stop: MustStop,
+    must_end: MustStop,
 ) -> Iterator[Certificate]:
     """Certificates from ever finer lattices, where costs are constant in cells."""
     lattice, level = first_lattice(problem, window)
@@ -335,7 +340,7 @@ def cell_certificates(
     search = FlowSearch(problem, lattice, length, gap, must_stop)
     while True:
         search.run()
-        yield search.certify()
+        yield search.certify(must_end)
         level += 1
         if must_stop() or level > FINEST or 4 * search.u.size > MOST_FINER_NODES:
             return

@@ -45,6 +45,9 @@ TOLERATED = 0.9998
 # A repair shrinks lengths at all nodes within this many rows and columns.
 REACH = 2
 
+# So much of a time limit is for the search: what it finds has to be proven, too.
+SEARCHED = 0.7
+
 # The window of a search is never smaller than this share of the bounds' longer side.
 SMALLEST_WINDOW = 1e-6
 
@@ -167,9 +170,9 @@ class Search:
         self.repairs += 1
         self._solve()
 
-    def certify(self) -> Certificate:
+    def certify(self, must_end: MustStop = never) -> Certificate:
         """The certificate that the present field makes."""
-        return certify(self.problem, self.proposal, self.needs, self.must_stop)
+        return certify(self.problem, self.proposal, self.needs, must_end)
 
 
 def search_window(problem: Problem, length: float) -> Bounds:
@@ -201,18 +204,20 @@ def certificates(
     *,
     target_gap: float = 0.0,
     must_stop: MustStop = never,
+    must_end: MustStop = never,
 ) -> Iterator[Certificate]:
     """Certificates from ever finer lattices.
 
     length : of a path that is known, map units. target_gap : of the lower bound. The search goes
     on to the next finer lattice when the norm is too large by at most a quarter of the target
-    gap, or when a repair gains little. Where it must stop, one last certificate comes at once.
+    gap, or when a repair gains little. Where it must stop, one last certificate comes, proven as
+    far as that goes before it must end.
     """
     window = search_window(problem, length)
     if problem.surface.cost_cells is not None:
         from .flow import cell_certificates
 
-        yield from cell_certificates(problem, window, length, target_gap, must_stop)
+        yield from cell_certificates(problem, window, length, target_gap, must_stop, must_end)
         return
     cap = length * (1.0 + 1e-6)
     for side in SIDES:
@@ -226,7 +231,7 @@ def certificates(
             search.repair()
             if search.likely_norm - 1.0 > 0.7 * (before - 1.0):
                 break
-        yield search.certify()
+        yield search.certify(must_end)
         if must_stop():
             return
 
@@ -254,24 +259,27 @@ def lower_bound(
         raise InputError(
             "no certificates are made with a travel model yet; problem.chord is a lower bound"
         )
-    must_stop = never if time_limit is None else stop_after(time_limit)
+    must_stop = must_end = never
+    if time_limit is not None:
+        must_stop, must_end = stop_after(SEARCHED * time_limit), stop_after(time_limit)
     # Overflow makes NaN, which proves nothing; so it needs no warning.
     with np.errstate(all="ignore"):
         known = known_length(problem, must_stop) if length is None else length
-        return _best(problem, known, target_gap, must_stop, watch)
+        found = certificates(
+            problem, known, target_gap=target_gap or 0.0, must_stop=must_stop, must_end=must_end
+        )
+        return _best(found, known, target_gap, watch)
 
 
 def _best(
-    problem: Problem,
+    certificates: Iterator[Certificate],
     length: float,
     target_gap: float | None,
-    must_stop: MustStop,
     watch: Watch | None,
 ) -> Certificate:
-    """The best certificate found until there is a reason to stop."""
+    """The best certificate until there is a reason to stop."""
     best: Certificate | None = None
-    gap = target_gap or 0.0
-    for found in certificates(problem, length, target_gap=gap, must_stop=must_stop):
+    for found in certificates:
         if best is None or found.value > best.value:
             best = found
         # Without a known length there is no gap to reach.

@@ -12,6 +12,7 @@ from .base import (
     INTERRUPT,
     TIME_LIMIT,
     Callback,
+    Progress,
     Stopper,
     answer_without_search,
     before_proof,
@@ -149,12 +150,20 @@ class _Run:
             solution,
             target_gap=None if self.candidates.is_exact else target,
             time_limit=self.stopper.seconds_left,
-            callback=self.stopper.must_stop,
+            callback=self.watch_proof,
         )
         if solution.status is Status.INTERRUPTED:
             return solution
         self.stopper.is_late()
         return replace(solution, stopped_by=self.reason(solution))
+
+    def watch_proof(self, progress: Progress) -> bool:
+        """Show the progress of the proof; whether the callback stops it."""
+        callback = self.stopper.callback
+        is_over = callback is not None and bool(callback(progress))
+        if is_over:
+            self.stopper.stopped_by = "callback"
+        return is_over
 
     def reason(self, solution: Solution) -> str:
         """What ended the run."""
