@@ -291,8 +291,8 @@ def test_on_rough_ground_it_is_beaten_by_no_planner_and_the_same_back(seed):
 @pytest.mark.parametrize("weight", [10.0, 1e6])
 def test_fast_marching_warns_where_its_nodes_do_not_show_the_ground(weight):
     with pytest.warns(tp.GroundWarning, match="longer than its field says.*optimal looks"):
-        tp.plan(rough_problem(0, weight), "fast-marching")
-    tp.plan(rough_problem(0, 0.1), "fast-marching")  # warnings are errors
+        tp.plan(rough_problem(1, weight), "fast-marching")
+    tp.plan(rough_problem(1, 0.1), "fast-marching")  # warnings are errors
 
 
 def test_a_fifth_of_the_time_is_kept_for_the_proof(monkeypatch):
