@@ -11,6 +11,7 @@ import terrapath as tp
 from cost_rasters import CELL, Walker, cell_surface, random_costs, random_heights
 from terrapath.geodesics import cell_routes
 from terrapath.geodesics.cell_routes import polished, shortest_through_cells
+from terrapath.geodesics.snell import obeying_snell
 
 COUNT = 40
 AXIS = CELL * np.arange(COUNT)
@@ -159,3 +160,23 @@ def test_on_large_maps_the_sides_of_those_cells_are_searched_that_matter(seed, m
     near = polished(problem, shortest_through_cells(problem))
     assert 0 < searched[0] <= 900 < COUNT * COUNT
     assert near.length <= 1.0005 * everywhere.length
+
+
+def test_bends_stay_within_cells_that_the_bounds_cut_off():
+    # Upwards to the west edge, where the last column is half a cell: Newton's steps lead beyond.
+    costs = np.full((COUNT, COUNT), 9.0)
+    costs[:, 0] = 1.0
+    surface = cell_surface(costs)
+    problem = tp.Problem(surface, (60.0, 100.0), (60.0, 300.0), bounds=(3.0, 95.0, 200.0, 305.0))
+    west, bend = problem.bounds.x1_min, 185.0
+    bent = [problem.start, (4.9, 120.0), (4.9, 125.0), (west, 125.0), (west, bend), problem.goal]
+    grid = cell_routes.grid_of(problem)
+    for first in range(2):
+        moved = obeying_snell(surface, grid.x, grid.y, np.array(bent), first)
+        assert problem.allows(moved)
+        assert problem.path(moved).length <= problem.path(bent).length
+    surface_edge = tp.Problem(surface, (60.0, 100.0), (60.0, 300.0))
+    bent = np.array([(60.0, 100.0), (0.0, 105.0), (0.0, 295.0), (60.0, 300.0)])
+    grid = cell_routes.grid_of(surface_edge)
+    for first in range(2):
+        assert surface_edge.allows(obeying_snell(surface, grid.x, grid.y, bent, first))

@@ -13,8 +13,9 @@ from ..surface import Surface
 from ..surface.metric import curve_length, segment_lengths
 from ..validation import Array
 
-# Differences are taken over this share of a side.
+# Differences are taken over this share of a side, and bends stay so far from the edge.
 STEP = 1e-4
+AT_EDGE = 2.0 * STEP
 # A bend moves by no more than so many sides.
 FARTHEST = 3.0
 # Steps of Newton's method, and how often one is halved.
@@ -97,10 +98,14 @@ def _rooms(x: Array, y: Array, points: Array, first: int) -> tuple[Array, Array,
         if axis != first:
             moves &= ~_is_on_side(share)
         moves[[0, -1]] = False
-        along[moves, axis] = np.diff(places)[k[moves]]
-        reached = k[moves] + share[moves]
-        low[moves] = np.maximum(-FARTHEST, -reached)
-        high[moves] = np.minimum(FARTHEST, len(places) - 1 - reached)
+        # The cells at the edge are cut off, so the way there is no whole number of sides. It is not
+        # gone to the end, because differences are taken on both sides of a bend.
+        at, sides = points[:, axis], np.diff(places)[k]
+        down, up = (places[0] - at) / sides + AT_EDGE, (places[-1] - at) / sides - AT_EDGE
+        moves &= (down < 0.0) & (up > 0.0)
+        along[moves, axis] = sides[moves]
+        low[moves] = np.maximum(-FARTHEST, down[moves])
+        high[moves] = np.minimum(FARTHEST, up[moves])
     return along, low, high
 
 
