@@ -143,9 +143,13 @@ class _Search:
         return progress
 
     def grow(self, draws: Array) -> None:
-        kernels.grow(
-            self.problem.priced.data, self.problem.free_space.data, self.tree, self.settings, draws
-        )
+        problem = self.problem
+        kernels.grow(problem.priced.data, problem.free_space.data, self.tree, self.settings, draws)
+
+
+def _prepare(problem: Problem, tree: trees.Tree, settings: trees.Options) -> None:
+    """Plant the tree; so the kernels are loaded, or compiled, before the clock starts."""
+    kernels.grow(problem.priced.data, problem.free_space.data, tree, settings, np.empty((0, 3)))
 
 
 def _reason_to_stop(search: _Search, callback: Callback | None) -> str:
@@ -285,8 +289,7 @@ def search_tree(problem: Problem, options: TreeOptions, callback: Callback | Non
     root = first.branch or first.path
     branch = None if root is None else sampled(root.points, settings.step)
     tree = _allocate(options.samples, problem.priced, branch)
-    # The tree is planted, so that the kernels are loaded, or compiled, before the clock starts.
-    _Search(problem, options, settings, tree, first).grow(np.empty((0, 3)))
+    _prepare(problem, tree, settings)
     search = _Search(problem, options, settings, tree, first)
     stopped_by = _run(search, callback)
     seconds = search.seconds
