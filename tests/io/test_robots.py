@@ -289,6 +289,18 @@ def test_a_damaged_laz_file_does_not_abort_the_process(tmp_path):
         tp.read_surface(path)
 
 
+@pytest.mark.parametrize("ending", ["las", "laz"])
+@pytest.mark.parametrize("at", [96, 100, 247])  # where points begin, how many records and points
+def test_a_header_that_claims_too_much_is_refused_before_memory_is_asked_for(tmp_path, ending, at):
+    path = write_cloud(tmp_path / f"cloud.{ending}", cloud(400))
+    content = bytearray(path.read_bytes())
+    content[at : at + 4] = b"\xff\xff\xff\xff"
+    path.write_bytes(content)
+    with pytest.raises(tp.MapError, match="claims more than its") as caught:
+        tp.read_surface(path)
+    one_line(caught)
+
+
 # How many cells
 
 

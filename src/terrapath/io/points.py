@@ -24,6 +24,7 @@ from .sources import Unsaid
 
 FEWEST = 16  # points of a map
 POINTS_IN_CELL = 4.0  # on average, where no cell is given
+MOST_PACKED = 1_000  # bytes of points that one byte of a LAZ file may hold
 
 NAMES = (("x", "easting", "lon", "longitude"), ("y", "northing", "lat", "latitude"),
          ("z", "height", "elevation", "altitude"))  # fmt: skip
@@ -108,10 +109,34 @@ def _of_las(path: Path) -> tuple[Array, CRS | None]:
     )
     import laspy
 
-    if path.suffix.lower() == ".laz":
+    is_packed = path.suffix.lower() == ".laz"
+    _require_moderate_header(path, MOST_PACKED if is_packed else 1)
+    if is_packed:
         _require_moderate_chunks(path)
     cloud = laspy.read(path)
     return np.column_stack([cloud.x, cloud.y, cloud.z]), parse_crs(cloud.header.parse_crs())
+
+
+def _require_moderate_header(path: Path, most_packed: int) -> None:
+    """Raise MapError where a file claims more than it can hold: memory for it would be asked for.
+
+    most_packed : how many bytes of points one byte of the file may hold.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(375)  # of the longest header, that of version 1.4
+
+    def number(at: int, width: int) -> int:
+        return int.from_bytes(head[at : at + width], "little")
+
+    is_newest = number(25, 1) >= 4
+    points, records = number(107, 4), 54 * number(100, 4)
+    if is_newest:
+        points, records = number(247, 8), records + 60 * number(243, 4)
+    if max(number(96, 4), records) > size or points * number(105, 2) > most_packed * size:
+        raise MapError(
+            f"{path} is damaged: its header claims more than its {size:,} bytes can hold"
+        )
 
 
 def _require_moderate_chunks(path: Path) -> None:
