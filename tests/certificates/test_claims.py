@@ -81,6 +81,8 @@ def test_the_facts_of_a_box_are_never_beyond_its_samples(seed):
         assert facts.norm >= norm.max() * (1.0 - 1e-11)
         assert facts.lowest <= lowest + 1e-12
         assert facts.chord <= chord * (1.0 + 1e-11)
+        # No sample of a proof's own is above the truth.
+        assert facts.least <= norm.max() * (1.0 + 1e-11)
         if box.a < 0.02 and box.b < 0.02:
             # Small boxes tell the truth: a sample is one of them, and so is the sample's norm.
             assert facts.sample == pytest.approx(norm.max(), rel=0.05)
@@ -277,12 +279,12 @@ def test_knots_cut_cells_and_never_leave_a_piece_of_no_width():
 
 
 def test_what_overflows_proves_nothing():
-    infinite = kernels.Facts(math.inf, 1.0, math.nan, 1.0)
+    infinite = kernels.Facts(math.inf, 1.0, 1.0, math.nan, 1.0)
     for facts in (infinite, infinite._replace(norm=math.nan, sample=math.nan, chord=math.nan)):
         assert kernels.need_of_box(facts, 3.0).proven == math.inf
-    assert kernels.need_of_box(kernels.Facts(4.0, 1.0, -math.inf, 1.0), 3.0).proven == 2.0
-    assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 3.0, 0.0), 3.0).proven == 0.0
-    assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 2.0, 1.0), 3.0).proven == 1.0
+    assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 1.0, -math.inf, 1.0), 3.0).proven == 2.0
+    assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 1.0, 3.0, 0.0), 3.0).proven == 0.0
+    assert kernels.need_of_box(kernels.Facts(4.0, 1.0, 1.0, 2.0, 1.0), 3.0).proven == 1.0
     surface = tp.Surface.from_peaks([[(1e-145, 1e307, 0.5, 0.5)]]).data
     bound = Potential(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0, False)
     box = surface_models.Box(0.5, 0.5, 0.5, 0.5)

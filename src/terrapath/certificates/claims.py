@@ -34,9 +34,6 @@ ROUNDING = 1e-9
 # A margin for the rounding of a layer's value, in units in the last place of its largest value.
 EPSILONS = 64.0
 
-# A norm is proven to within this share of what samples of it suggest, and no closer.
-CLOSE = 3e-5
-
 # Cells proven between two looks at whether to stop.
 CHUNK = 32
 
@@ -391,8 +388,7 @@ def proven_claim(
     found : what its cells need. Where no norm can be proven, the length of the straight line in
     R^n is the bound. Where it must stop, the value is what is proven so far.
     """
-    enough = max(float(found.likely.max()) * (1.0 + CLOSE), FLATTEST)
-    norm = proven_norm(problem, claim, found.proven, enough, must_stop)
+    norm = proven_norm(problem, claim, found.proven, FLATTEST, must_stop)
     if not math.isfinite(norm):
         nothing = np.zeros_like(claim.coefficients)
         claim, norm = replace(claim, coefficients=nothing, horizon=0.0), 1.0

@@ -35,6 +35,7 @@ class Facts(NamedTuple):
 
     norm: float  # at least the square of the dual norm of du anywhere in the box
     sample: float  # its largest value at nine points, without the models' remainders
+    least: float  # at most that largest value, remainders included
     lowest: float  # at most u anywhere in the box
     chord: float  # at most the chord from anywhere in the box to the goal, times the least cost
 
@@ -45,14 +46,23 @@ def outside(low, high, value):
     return max(low - value, value - high, 0.0)
 
 
+class Ratio(NamedTuple):
+    """The largest ratio of two models at nine points."""
+
+    likely: float  # of their polynomials
+    least: float  # at most the true one
+
+
 @inner_kernel
 def largest_ratio(top, bottom):
     """The largest top / bottom at the corners, the middles of the sides and the centre."""
-    largest = 0.0
+    likely, least = 0.0, 0.0
     for m in range(9):
         p, q = m % 3 - 1.0, m // 3 - 1.0
-        largest = max(largest, polynomial(top, p, q) / polynomial(bottom, p, q))
-    return largest
+        above, below = polynomial(top, p, q), polynomial(bottom, p, q)
+        likely = max(likely, above / below)
+        least = max(least, (above - top.r) / (below + bottom.r))
+    return Ratio(likely, least)
 
 
 @inner_kernel
@@ -96,9 +106,11 @@ def facts_of_part(surface, potential, goal, i, j, box, part, work):
     excess = minus(top, times_number(bottom, middle))
     floor = floor_of(surface)
     least = max(bottom.c00 - spread(bottom), floor * floor)
+    ratio = largest_ratio(top, bottom)
     return Facts(
         middle + (abs(excess.c00) + spread(excess)) / least,
-        largest_ratio(top, bottom),
+        ratio.likely,
+        ratio.least,
         u.value.c00 - spread(u.value),
         floor * math.sqrt(chord),
     )
@@ -117,6 +129,7 @@ def facts_of_box(surface, potential, goal, i, j, box, work):
     return Facts(
         norm if norm < math.inf else math.inf,
         max(facts.sample, other.sample),
+        max(facts.least, other.least),
         min(facts.lowest, other.lowest),
         facts.chord,
     )
@@ -131,6 +144,7 @@ class Need(NamedTuple):
     proven: float  # this is enough
     likely: float  # this is enough at nine points
     slope: float  # the dual norm at those points
+    least: float  # no M below this is enough, but for what the chord says of smaller boxes
 
 
 @inner_kernel
@@ -149,7 +163,8 @@ def need_of_box(facts, horizon):
         by_chord = 0.0
     elif short < math.inf and 0.0 < facts.chord < math.inf:
         by_chord = short / facts.chord
-    return Need(min(slope, by_chord), min(likely, by_chord), likely)
+    least = min(math.sqrt(max(facts.least, 0.0)), by_chord)
+    return Need(min(slope, by_chord), min(likely, by_chord), likely, least)
 
 
 class Cutting(NamedTuple):
@@ -192,20 +207,21 @@ def cut_cell(surface, potential, i, j, cutting):
 def need_of_cell(surface, potential, goal, horizon, i, j, cutting):
     """The M that cell (i, j) needs, by models over its pieces, which are not cut further."""
     pieces = cut_cell(surface, potential, i, j, cutting)
-    proven, likely, slope = 0.0, 0.0, 0.0
+    proven, likely, slope, least = 0.0, 0.0, 0.0, 0.0
     for q in range(pieces.rows):
         for p in range(pieces.columns):
             box = piece(cutting, p, q)
             facts = facts_of_box(surface, potential, goal, i, j, box, cutting.work)
             need = need_of_box(facts, horizon)
             proven, likely = max(proven, need.proven), max(likely, need.likely)
-            slope = max(slope, need.slope)
-    return Need(proven, likely, slope)
+            slope, least = max(slope, need.slope), max(least, need.least)
+    return Need(proven, likely, slope, least)
 
 
-# A box is cut in four where that could lower M by this share, and at most this often.
+# A box is cut in four where that could lower M by this share, and at most this often. Models of
+# large boxes on rough ground are far above the truth, so what they find likely is no measure.
 WORTHWHILE = 2e-5
-DEPTH = 6
+DEPTH = 10
 
 
 @kernel
@@ -227,7 +243,7 @@ def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, cutting):
         need = need_of_box(facts, horizon)
         if need.proven <= norm:
             continue
-        if depth == DEPTH or need.proven <= (1.0 + WORTHWHILE) * need.likely:
+        if depth == DEPTH or need.proven <= (1.0 + WORTHWHILE) * need.least:
             norm = need.proven
             continue
         for m in range(4):
