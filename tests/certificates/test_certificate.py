@@ -68,6 +68,7 @@ def test_the_checker_shares_nothing_with_the_solver():
         "validation",
     }
     assert imports_of(claims) == {
+        "_kernels.certificates.margins",
         "_kernels.certificates.norms",
         "_kernels.certificates.potentials",
         "_kernels.surface.points",

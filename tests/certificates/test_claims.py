@@ -13,7 +13,7 @@ import pytest
 import certificate_oracles as oracles
 import terrapath as tp
 from certificate_cases import BOUNDS, SIDE, certified, random_surface, square
-from terrapath._kernels.certificates import norms as kernels, surface_models
+from terrapath._kernels.certificates import margins, norms as kernels, surface_models
 from terrapath._kernels.certificates.potentials import Potential
 from terrapath.certificates import claims
 from terrapath.certificates.claims import Core
@@ -177,8 +177,8 @@ def test_the_facts_of_a_box_close_in_at_second_order(on_spline):
             box = surface_models.Box(x, y, half, half)
             facts = facts_of(surface, bound, 2, 2, box, goal)
             norm, lowest, _ = sampled_facts(surface, bound, box, goal)
-            margin = kernels.margin_of_box(
-                surface.data, bound, kernels.Anchor(goal, 1.0, math.inf), 0.9, 2, 2, box
+            margin = margins.margin_of_box(
+                surface.data, bound, margins.Anchor(goal, 1.0, math.inf), 0.9, 2, 2, box
             )
             sheet, terrain, points = (
                 oracles.Sheet(*bound[:5]),
@@ -288,5 +288,5 @@ def test_what_overflows_proves_nothing():
     surface = tp.Surface.from_peaks([[(1e-145, 1e307, 0.5, 0.5)]]).data
     bound = Potential(np.zeros((4, 4)), 0.0, 0.0, 1.0, 1.0, False)
     box = surface_models.Box(0.5, 0.5, 0.5, 0.5)
-    anchor = kernels.Anchor(np.ones(3), 1.0, math.inf)
-    assert kernels.margin_of_box(surface, bound, anchor, 1.0, 0, 0, box) == -math.inf
+    anchor = margins.Anchor(np.ones(3), 1.0, math.inf)
+    assert margins.margin_of_box(surface, bound, anchor, 1.0, 0, 0, box) == -math.inf

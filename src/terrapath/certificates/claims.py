@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._kernels.certificates import norms as kernels
+from .._kernels.certificates import margins, norms as kernels
 from .._kernels.certificates.potentials import Potential
 from .._kernels.surface.points import fill_values
 from .._kernels.surface.surfaces import Peaks, Spline
@@ -255,6 +255,25 @@ def proven_norm(
     return norm * (1.0 + ROUNDING)
 
 
+def sharper_needs(
+    problem: Problem, claim: Claim, found: Needs, enough: float, must_stop: MustStop = never
+) -> Needs:
+    """The needs of which each one above ``enough`` is proven roughly as low as it can be.
+
+    Those of cells that are left where it must stop stay as they are.
+    """
+    ground, cutting = _ground(problem), _cutting(problem, claim.lattice)
+    given = (ground.surface, _potential(problem, claim), ground.goal, float(claim.horizon))
+    proven, norm = found.proven.copy(), float(enough) / (1.0 + ROUNDING)
+    for j, row in enumerate(proven):
+        if must_stop():
+            break
+        if row.max() > norm:
+            kernels.sharpen_needs(*given, j, norm, cutting, row)
+            row[:] = np.where(row < found.proven[j], row * (1.0 + ROUNDING), row)
+    return found._replace(proven=proven)
+
+
 class End(NamedTuple):
     """The start or the goal."""
 
@@ -264,7 +283,7 @@ class End(NamedTuple):
     doubt: float  # how much a chord may be too long because of rounding, map units
 
 
-def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
+def _anchor(problem: Problem, claim: Claim, end: End) -> margins.Anchor:
     """An end, and the least cost of the ground around its core.
 
     The ground is the core, widened by half its size on all sides. Let c be the cost at the end and
@@ -273,7 +292,7 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
     """
     surface, data = problem.surface, problem.surface.data
     if not (surface.costs and isinstance(data, Spline)):
-        return kernels.Anchor(end.lifted, 1.0, math.inf)
+        return margins.Anchor(end.lifted, 1.0, math.inf)
     x0, y0, x1, y1 = _extent(claim.lattice, end.core)
     width, height = 0.5 * (x1 - x0), 0.5 * (y1 - y0)
     around = Bounds(x0 - width, y0 - height, x1 + width, y1 + height)
@@ -289,7 +308,7 @@ def _anchor(problem: Problem, claim: Claim, end: End) -> kernels.Anchor:
     found, cost = span_within(data, around), float(surface.cost((x, y)))
     farthest = math.hypot(max(x - x0, x1 - x), max(y - y0, y1 - y), found.rise)
     floor = max(found.least, cost - 0.5 * found.steepest * farthest) * (1.0 - ROUNDING)
-    return kernels.Anchor(end.lifted, floor, found.least * (1.0 - ROUNDING) * float(far))
+    return margins.Anchor(end.lifted, floor, found.least * (1.0 - ROUNDING) * float(far))
 
 
 def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> float:
@@ -298,7 +317,7 @@ def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> floa
     The distance is at least the chord times the least cost around.
     """
     core, anchor = end.core, _anchor(problem, claim, end)
-    margin = kernels.margin_of_core(
+    margin = margins.margin_of_core(
         _ground(problem).surface,
         _potential(problem, claim),
         anchor,
@@ -333,29 +352,15 @@ def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
         end = End(claim.goal_core, problem.goal, goal, doubt)
         first = edge_margin(problem, claim, begin, -1.0 / norm)
         last = edge_margin(problem, claim, end, 1.0 / norm)
-    detour = least * least_detour(problem, claim.bounds) * (1.0 - ROUNDING)
+    detour = (
+        least
+        * problem.bounds.least_detour(claim.bounds, problem.start, problem.goal)
+        * (1.0 - ROUNDING)
+    )
     rest = min(last, claim.horizon / norm - least * doubt)
     within = first + rest - ROUNDING * (abs(first) + abs(rest))
     # ``within`` is NaN where something overflowed; then the comparison is False.
     return max(min(within, detour), straight) if within > straight else straight
-
-
-def least_detour(problem: Problem, window: Bounds) -> float:
-    """The least length on the plane of a path that leaves a window of the problem's bounds.
-
-    Such a path touches a side of the window. So it is at least as long as the straight line from
-    the start to the mirror image of the goal at that side.
-    """
-    (x0, y0), (x1, y1) = problem.start, problem.goal
-    outer, found = problem.bounds, math.inf
-    # Differences first: far from the map's origin the sum of two places loses digits.
-    for side in (window.x1_min, window.x1_max):
-        if outer.x1_min < side < outer.x1_max:
-            found = min(found, math.hypot((x0 - side) + (x1 - side), y1 - y0))
-    for side in (window.x2_min, window.x2_max):
-        if outer.x2_min < side < outer.x2_max:
-            found = min(found, math.hypot(x1 - x0, (y0 - side) + (y1 - side)))
-    return found
 
 
 def require_proven(problem: Problem, claim: Claim) -> None:

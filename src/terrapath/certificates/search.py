@@ -17,13 +17,14 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from .._kernels.surface.surfaces import Spline
 from .._support.watching import MustStop, never, stop_after
 from ..distance.eikonal import Eikonal, model_source, near_distance, window_radius
 from ..errors import InputError
 from ..problem import Problem
 from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
-from ..validation import Array, require_positive
+from ..validation import Array, require_count, require_positive
 from .certificate import Certificate, certify
 from .claims import Claim, Core, Needs, cell_needs
 
@@ -47,6 +48,13 @@ REACH = 2
 
 # So much of a time limit is for the search: what it finds has to be proven, too.
 SEARCHED = 0.7
+
+# With fewer of its cells along the window's longer side, a surface is smooth enough for fields.
+FEWEST_CELLS = 60
+
+# No lattice has more nodes than this. By default a plan's bound is searched for until its gap is
+# good, on lattices with up to the second number: two seconds of one core, but by no clock.
+MOST_NODES, FEW_NODES, GOOD_GAP = 6_000_000, 160_000, 1e-3
 
 # The window of a search is never smaller than this share of the bounds' longer side.
 SMALLEST_WINDOW = 1e-6
@@ -87,25 +95,6 @@ def _windows(values: npt.NDArray[T], size: int) -> npt.NDArray[T]:
     return np.asarray(sliding_window_view(rows, size, axis=1).max(axis=-1))
 
 
-def _cores(problem: Problem, lattice: Lattice) -> tuple[Core, Core]:
-    """The cells around both ends; if possible so few that the cores do not meet."""
-    bounds = lattice.bounds
-    corner, cell = np.array([bounds.x1_min, bounds.x2_min]), np.array([lattice.dx, lattice.dy])
-    ends = [(np.asarray(end) - corner) / cell for end in (problem.start, problem.goal)]
-    apart = int(np.abs(ends[0] - ends[1]).max() / 2.0 - 1.0)
-    reach = min(max(apart, 1), CORE)
-    start, goal = (
-        Core(
-            max(round(column) - reach, 0),
-            min(round(column) + reach, lattice.nx - 1),
-            max(round(row) - reach, 0),
-            min(round(row) + reach, lattice.ny - 1),
-        )
-        for column, row in ends
-    )
-    return start, goal
-
-
 def _horizon(problem: Problem, lattice: Lattice, u: Array, core: Core) -> float:
     """The least distance from start to goal through the nodes on the goal core's edge."""
     window = np.s_[core.row0 : core.row1 + 1, core.column0 : core.column1 + 1]
@@ -141,7 +130,8 @@ class Search:
             window_radius(problem.surface, lattice),
             lambda points: near_distance(problem.surface, problem.start, points),
         )
-        self.start_core, self.goal_core = _cores(problem, lattice)
+        blocks = lattice.blocks_around((problem.start, problem.goal), CORE)
+        self.start_core, self.goal_core = (Core(*block) for block in blocks)
         self.repairs = 0
         self._solve()
 
@@ -203,6 +193,7 @@ def certificates(
     length: float = math.inf,
     *,
     target_gap: float = 0.0,
+    most_nodes: int = MOST_NODES,
     must_stop: MustStop = never,
     must_end: MustStop = never,
 ) -> Iterator[Certificate]:
@@ -210,8 +201,9 @@ def certificates(
 
     length : of a path that is known, map units. target_gap : of the lower bound. The search goes
     on to the next finer lattice when the norm is too large by at most a quarter of the target
-    gap, or when a repair gains little. Where it must stop, one last certificate comes, proven as
-    far as that goes before it must end.
+    gap, or when a repair gains little. On rough ground the best potential is searched for after
+    the first lattice. most_nodes : no lattice but the first has more. Where it must stop, one last
+    certificate comes, proven as far as that goes before it must end.
     """
     window = search_window(problem, length)
     if problem.surface.cost_cells is not None:
@@ -221,8 +213,10 @@ def certificates(
         return
     cap = length * (1.0 + 1e-6)
     for side in SIDES:
-        spacing = max(window.width, window.height) / side
-        search = Search(problem, Lattice.spanning(window, spacing), cap, must_stop)
+        lattice = Lattice.spanning(window, max(window.width, window.height) / side)
+        if side > SIDES[0] and lattice.nx * lattice.ny > most_nodes:
+            return
+        search = Search(problem, lattice, cap, must_stop)
         tolerable = 1.0 + max(0.25 * target_gap, 5e-5)
         for _ in range(REPAIRS):
             before = search.likely_norm
@@ -234,6 +228,20 @@ def certificates(
         yield search.certify(must_end)
         if must_stop():
             return
+        if is_rough(problem, window):
+            gap = target_gap or GOOD_GAP
+            from .spline_levels import spline_certificates
+
+            yield from spline_certificates(problem, window, gap, most_nodes, must_stop, must_end)
+            return
+
+
+def is_rough(problem: Problem, window: Bounds) -> bool:
+    """Has the surface so many knots that the best potential is searched for on these?"""
+    data = problem.surface.data
+    if not isinstance(data, Spline):
+        return False
+    return max(window.width / data.dx, window.height / data.dy) >= FEWEST_CELLS
 
 
 def lower_bound(
@@ -241,6 +249,7 @@ def lower_bound(
     *,
     length: float | None = None,
     target_gap: float | None = None,
+    most_nodes: int = MOST_NODES,
     time_limit: float | None = None,
     watch: Watch | None = None,
 ) -> Certificate:
@@ -249,7 +258,8 @@ def lower_bound(
     length : of a path that is known, map units. With it the search leaves out ground that no
     shorter path can visit. target_gap : the search stops when (length - bound) / bound is no more
     than this; by default, and where no path is known, it stops after the first, coarsest lattice.
-    time_limit : seconds. watch : is called with each certificate; returning True stops the search.
+    most_nodes : of any lattice but the first. time_limit : seconds. watch : is called with each
+    certificate; returning True stops the search.
     Returns the best certificate found, which compares with numbers by its value. Where time was up
     before the first one was proven, its bound may be no more than the chord.
     Raises InputError for numbers that are not above 0.
@@ -259,6 +269,7 @@ def lower_bound(
         raise InputError(
             "no certificates are made with a travel model yet; problem.chord is a lower bound"
         )
+    require_count(most_nodes=most_nodes)
     must_stop = must_end = never
     if time_limit is not None:
         must_stop, must_end = stop_after(SEARCHED * time_limit), stop_after(time_limit)
@@ -266,7 +277,12 @@ def lower_bound(
     with np.errstate(all="ignore"):
         known = known_length(problem, must_stop) if length is None else length
         found = certificates(
-            problem, known, target_gap=target_gap or 0.0, must_stop=must_stop, must_end=must_end
+            problem,
+            known,
+            target_gap=target_gap or 0.0,
+            most_nodes=most_nodes,
+            must_stop=must_stop,
+            must_end=must_end,
         )
         return _best(found, known, target_gap, watch)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..certificates.certificate import Certificate
-from ..certificates.search import lower_bound
+from ..certificates.search import FEW_NODES, GOOD_GAP, MOST_NODES, lower_bound
 from ..errors import UnfinishedWarning, tell, tell_unfinished
 from ..geodesics.refinement import refine
 from ..problem import Problem, Solution, Status
@@ -36,7 +36,7 @@ class Finished:
     """A planner whose paths are refined, and whose solutions get a lower bound.
 
     refine : take the path to the locally shortest one. bound : prove a lower bound on the
-    length of every path, on one coarse lattice. target_gap : improve the bound until
+    length of every path, by about two seconds' work. target_gap : improve the bound until
     (length - bound) / bound is no more than this; it implies ``bound``. time_limit : seconds
     for the planner and the finishing together; a fifth of it is kept for the bound where one is
     asked for. When time is up, the solution has the path and the bound that there are: a path
@@ -154,7 +154,8 @@ def with_bound(
 
     With a travel model the bound is the chord: the straight line of constant grade.
 
-    target_gap : improve the bound until the gap is no more than this. time_limit : seconds.
+    target_gap : improve the bound until the gap is no more than this; by default until a tenth of a
+    percent, or for about two seconds' work, by no clock. time_limit : seconds.
     ``callback`` sees each bound, and ends the search for a better one by returning True.
     After Ctrl-C the best bound proven so far is kept, if there is one.
     """
@@ -178,7 +179,8 @@ def with_bound(
         best = lower_bound(
             solution.problem,
             length=solution.path.length,
-            target_gap=target_gap,
+            target_gap=target_gap or GOOD_GAP,
+            most_nodes=MOST_NODES if target_gap else FEW_NODES,
             time_limit=time_limit,
             watch=watch,
         )

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from .._kernels.space.free_space import Grid
 from ..errors import InputError
 from ..surface.bounds import Bounds, Cells
-from ..validation import Array, require_positive
+from ..validation import Array, Point, require_positive
 
 # By default the region's longer side has this many nodes. Where the surface has finer features it
 # has more, up to the second number.
@@ -105,6 +105,21 @@ class Lattice:
         south, north = max(rows.min() - 2, 0), min(rows.max() + 2, self.ny - 1)
         x, y = self.x, self.y
         return Bounds(float(x[west]), float(y[south]), float(x[east]), float(y[north]))
+
+    def blocks_around(self, ends: tuple[Point, Point], most: int) -> list[tuple[int, ...]]:
+        """Blocks of cells around two places: first and last column of nodes, first and last row.
+
+        They reach at most so many cells from a place; if possible so few that they do not meet.
+        """
+        places = [np.subtract(end, self.bounds[:2]) / self.spacing for end in ends]
+        apart = int(np.abs(places[0] - places[1]).max() / 2.0 - 1.0)
+        reach = min(max(apart, 1), most)
+        last = np.array([self.nx, self.ny]) - 1
+        blocks = []
+        for place in np.rint(places).astype(int):
+            low, high = np.maximum(place - reach, 0), np.minimum(place + reach, last)
+            blocks.append(tuple(int(k) for k in (low[0], high[0], low[1], high[1])))
+        return blocks
 
     @property
     def spacing(self) -> Spacing:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
-from ..validation import Array, as_array
+from ..validation import Array, Point, as_array
 
 
 class Bounds(NamedTuple):
@@ -51,6 +51,22 @@ class Bounds(NamedTuple):
     def encloses(self, other: Bounds) -> bool:
         """Does the other rectangle lie wholly in this one?"""
         return bool(self.contains(np.array([other[:2], other[2:]])).all())
+
+    def least_detour(self, window: Bounds, start: Point, goal: Point) -> float:
+        """The least length of a path that leaves a window of this rectangle, map units.
+
+        Such a path touches a side of the window. So it is at least as long as the straight line
+        from the start to the mirror image of the goal at that side.
+        """
+        (x0, y0), (x1, y1), found = start, goal, math.inf
+        # Differences first: far from the map's origin the sum of two places loses digits.
+        for side in (window.x1_min, window.x1_max):
+            if self.x1_min < side < self.x1_max:
+                found = min(found, math.hypot((x0 - side) + (x1 - side), y1 - y0))
+        for side in (window.x2_min, window.x2_max):
+            if self.x2_min < side < self.x2_max:
+                found = min(found, math.hypot(x1 - x0, (y0 - side) + (y1 - side)))
+        return found
 
     def __str__(self) -> str:
         return (

@@ -14,7 +14,6 @@ from ..surface.surfaces import floor_of
 from .potentials import parts_over, potential_over
 from .surface_models import Box, cut_at_knots, layer_over, times_squared_cost
 from .taylor import (
-    Model,
     constant,
     cross,
     keep,
@@ -218,15 +217,19 @@ def need_of_cell(surface, potential, goal, horizon, i, j, cutting):
     return Need(proven, likely, slope, least)
 
 
-# A box is cut in four where that could lower M by this share, and at most this often. Models of
+# A box is cut in four where that could lower M by this share, or roughly by the second one, and at
+# most this often. Models of
 # large boxes on rough ground are far above the truth, so what they find likely is no measure.
-WORTHWHILE = 2e-5
+WORTHWHILE, ROUGHLY = 2e-5, 3e-4
 DEPTH = 10
 
 
 @kernel
-def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, cutting):
-    """The least M, at least ``norm``, that is enough for a box; it is cut where that helps."""
+def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, share, cutting):
+    """The least M, at least ``norm``, that is enough for a box, but for a share.
+
+    It is cut where that helps.
+    """
     boxes = cutting.boxes
     boxes[0, 0], boxes[0, 1], boxes[0, 2], boxes[0, 3], boxes[0, 4] = (
         box.x,
@@ -243,7 +246,7 @@ def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, cutting):
         need = need_of_box(facts, horizon)
         if need.proven <= norm:
             continue
-        if depth == DEPTH or need.proven <= (1.0 + WORTHWHILE) * need.least:
+        if depth == DEPTH or need.proven <= (1.0 + share) * need.least:
             norm = need.proven
             continue
         for m in range(4):
@@ -253,6 +256,26 @@ def norm_of_box(surface, potential, goal, horizon, i, j, box, norm, cutting):
             boxes[waiting, 4] = depth + 1.0
             waiting += 1
     return norm
+
+
+@kernel
+def norm_of_cell(surface, potential, goal, horizon, i, j, norm, share, cutting):
+    """The least M, at least ``norm``, that is enough for cell (i, j), but for a share."""
+    pieces = cut_cell(surface, potential, i, j, cutting)
+    for q in range(pieces.rows):
+        for p in range(pieces.columns):
+            box = piece(cutting, p, q)
+            norm = norm_of_box(surface, potential, goal, horizon, i, j, box, norm, share, cutting)
+    return norm
+
+
+@kernel
+def sharpen_needs(surface, potential, goal, horizon, j, norm, cutting, needs):
+    """Replace the needs of row j (nx,) that are above ``norm`` by roughly the least ones."""
+    for i in range(needs.shape[0]):
+        if needs[i] > norm:
+            found = norm_of_cell(surface, potential, goal, horizon, i, j, norm, ROUGHLY, cutting)
+            needs[i] = min(found, needs[i])
 
 
 @kernel
@@ -307,103 +330,6 @@ def least_norm(surface, potential, goal, horizon, order, needs, norm, cutting):
         i, j = n % columns, n // columns
         if needs[j, i] <= norm:
             break
-        found = norm
-        pieces = cut_cell(surface, potential, i, j, cutting)
-        for q in range(pieces.rows):
-            for p in range(pieces.columns):
-                box = piece(cutting, p, q)
-                found = norm_of_box(surface, potential, goal, horizon, i, j, box, found, cutting)
+        found = norm_of_cell(surface, potential, goal, horizon, i, j, norm, WORTHWHILE, cutting)
         norm = min(found, needs[j, i])
     return norm
-
-
-# The margin on the edge of a core, a block of cells around an end of all paths
-
-
-class Anchor(NamedTuple):
-    """The start or the goal, and how far a nearby point p is from it at least.
-
-    That is the lesser of ``floor`` times the chord and ``far``: near the anchor no cost is below
-    the floor, and a path that leaves this neighbourhood is already ``far`` long.
-    """
-
-    lifted: np.ndarray  # (2 + layers,)
-    floor: float
-    far: float
-
-
-@kernel
-def margin_of_box(surface, potential, anchor, factor, i, j, box):
-    """At most distance(anchor, p) + factor u(p) for any p of a box inside cell (i, j)."""
-    parts = parts_over(potential, i, j, box)
-    margin = margin_of_part(surface, potential, anchor, factor, i, j, box, parts.first)
-    if parts.last == parts.first:
-        return margin
-    other = margin_of_part(surface, potential, anchor, factor, i, j, box, parts.last)
-    return min(margin, other)
-
-
-@kernel
-def margin_of_part(surface, potential, anchor, factor, i, j, box, part):
-    """The same for a piece of u.
-
-    The chord is convex in R^n, so that it is nowhere below its tangent at the box's centre.
-    """
-    floor, end = anchor.floor, anchor.lifted
-    east, north = box.x - end[0], box.y - end[1]
-    squared = east * east + north * north
-    for k in range(surface.weights.shape[0]):
-        rise = layer_over(surface, k, box).value.c00 - end[2 + k]
-        squared += rise * rise
-    chord = math.sqrt(squared)
-    total = times_number(potential_over(potential, i, j, box, part).value, factor)
-    outside_margin = anchor.far + total.c00 - spread(total)
-    if chord > 0.0:
-        along_x, along_y = floor * box.a * east / chord, floor * box.b * north / chord
-        tangent = Model(floor * chord, along_x, along_y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        total = plus(total, tangent)
-        for k in range(surface.weights.shape[0]):
-            value = layer_over(surface, k, box).value
-            offset = minus(value, constant(value.c00))
-            rise = value.c00 - end[2 + k]
-            total = plus(total, times_number(offset, floor * rise / chord))
-    margin = min(total.c00 - spread(total), outside_margin)
-    # NaN where something overflowed.
-    return margin if margin > -math.inf else -math.inf
-
-
-# A cell's side on the core's edge is cut into this many parts.
-PARTS = 8
-
-
-@kernel
-def margin_of_side(surface, potential, anchor, factor, i, j, axis, at, cutting):
-    """The least margin along a side of cell (i, j): along ``axis``, at ``at`` on the other."""
-    low = potential.x0 + i * potential.dx if axis == 0 else potential.y0 + j * potential.dy
-    high = low + (potential.dx if axis == 0 else potential.dy)
-    cuts = cutting.x if axis == 0 else cutting.y
-    margin = math.inf
-    for k in range(cut_at_knots(surface, axis, low, high, cuts)):
-        half = 0.5 * (cuts[k + 1] - cuts[k]) / PARTS
-        for m in range(PARTS):
-            middle = cuts[k] + (2 * m + 1) * half
-            box = Box(middle, at, half, 0.0) if axis == 0 else Box(at, middle, 0.0, half)
-            margin = min(margin, margin_of_box(surface, potential, anchor, factor, i, j, box))
-    return margin
-
-
-@kernel
-def margin_of_core(surface, potential, anchor, factor, i0, i1, j0, j1, cutting):
-    """The least margin on the edge of the cells [i0, i1) x [j0, j1)."""
-    margin = math.inf
-    left, right = potential.x0 + i0 * potential.dx, potential.x0 + i1 * potential.dx
-    bottom, top = potential.y0 + j0 * potential.dy, potential.y0 + j1 * potential.dy
-    for i in range(i0, i1):
-        for j, at in ((j0, bottom), (j1 - 1, top)):
-            side = margin_of_side(surface, potential, anchor, factor, i, j, 0, at, cutting)
-            margin = min(margin, side)
-    for j in range(j0, j1):
-        for i, at in ((i0, left), (i1 - 1, right)):
-            side = margin_of_side(surface, potential, anchor, factor, i, j, 1, at, cutting)
-            margin = min(margin, side)
-    return margin
