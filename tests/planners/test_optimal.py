@@ -9,6 +9,7 @@ import shapely
 import terrapath as tp
 from common import FLAT, REAL_MAPS, REGION, mostly_slow
 from planner_oracles import visibility_length
+from rough_maps import random_map
 from terrapath.errors import UnfinishedWarning
 from terrapath.geodesics import alternatives
 from terrapath.planners import candidates
@@ -293,6 +294,12 @@ def test_fast_marching_warns_where_its_nodes_do_not_show_the_ground(weight):
     with pytest.warns(tp.GroundWarning, match="longer than its field says.*optimal looks"):
         tp.plan(rough_problem(1, weight), "fast-marching")
     tp.plan(rough_problem(1, 0.1), "fast-marching")  # warnings are errors
+
+
+def test_finer_fields_hold_both_ends():
+    problem = random_map(200_001).problem()  # the nodes around its start are far above it
+    solution = tp.plan(problem, "optimal", target_gap=10.0)
+    assert solution.status is tp.Status.SOLVED
 
 
 def test_a_fifth_of_the_time_is_kept_for_the_proof(monkeypatch):

@@ -252,7 +252,14 @@ class Candidates:
         one, other = self.fields
         longest = self.best * (1.0 + max(SLACK, 2.0 * abs(self.distance / self.best - 1.0)))
         near = one.values + other.values <= longest
-        return one.lattice.around(near) if near.any() else self.problem.bounds
+        if not near.any():
+            return self.problem.bounds
+        # On the roughest ground the nodes around an end need not be near.
+        box, ends = one.lattice.around(near), (self.problem.start, self.problem.goal)
+        (x0, x1), (y0, y1) = (sorted(places) for places in zip(*ends, strict=True))
+        return Bounds(
+            min(box.x1_min, x0), min(box.x2_min, y0), max(box.x1_max, x1), max(box.x2_max, y1)
+        )
 
     # Routes
 
