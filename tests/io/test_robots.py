@@ -289,6 +289,15 @@ def test_a_damaged_laz_file_does_not_abort_the_process(tmp_path):
         tp.read_surface(path)
 
 
+@pytest.mark.parametrize("span", [1e-200, 1e-300, 1e-12])
+def test_points_that_all_but_meet_are_refused_in_one_line(tmp_path, span):
+    x, y = span * np.random.default_rng(0).uniform(size=(2, 50))
+    points = np.column_stack([x, y * 1e300 * span, 0.0 * x])
+    with pytest.raises(tp.MapError) as caught:
+        tp.read_surface(write_cloud(tmp_path / "cloud.csv", points))
+    one_line(caught)
+
+
 @pytest.mark.parametrize("ending", ["las", "laz"])
 @pytest.mark.parametrize("at", [96, 100, 247])  # where points begin, how many records and points
 def test_a_header_that_claims_too_much_is_refused_before_memory_is_asked_for(tmp_path, ending, at):

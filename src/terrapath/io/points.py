@@ -74,7 +74,11 @@ def _grid_of(path: Path, points: Array, unsaid: Unsaid) -> Grid:
     side = unsaid.cell_size or step or mean
     if side == step:
         low = low - 0.5 * side  # the points are the centres of cells
-    columns, rows = (np.floor(span / side).astype(int) + 1).tolist()
+    with np.errstate(all="ignore"):
+        counts = np.floor(span / side) + 1.0
+    if not np.isfinite(counts).all():
+        raise MapError(f"{path}: its points are so near each other that no cell fits; check them")
+    columns, rows = map(int, counts.tolist())
     require_few_cells(f"{path}, on cells of {side:g},", rows, columns, unsaid.most_cells)
     return Grid(rows, columns, Affine(side, 0.0, low[0], 0.0, side, low[1]))
 
