@@ -8,6 +8,7 @@ import pytest
 import shapely
 
 import terrapath as tp
+from terrapath.distance.field import field_of
 from terrapath.planners import plan_goals, plan_tour
 from travel_judges import MODELS
 from travel_problems import BOUNDS, heading, hills, plane
@@ -159,6 +160,8 @@ def test_proofs_and_alternatives_by_length_are_refused():
         tp.lower_bound(over_hills())
     with pytest.raises(tp.InputError, match="no travel model"):
         tp.alternatives(over_hills())
+    with pytest.raises(tp.InputError, match="distance fields know lengths alone"):
+        field_of(over_hills())
 
 
 def test_refining_never_makes_a_path_dearer():

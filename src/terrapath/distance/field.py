@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from .._kernels.distance import descent
 from .._support.watching import WatchCount
-from ..errors import OutsideSurfaceError
+from ..errors import InputError, OutsideSurfaceError
 from ..problem import Path, Problem
 from ..space.free_space import FreeSpace, Obstacle
 from ..space.lattice import Lattice
@@ -222,7 +222,15 @@ def distance_field(
 def field_of(
     problem: Problem, *, spacing: float | None = None, watch: WatchCount | None = None
 ) -> DistanceField:
-    """Distances from a problem's start through its free space; see ``distance_field``."""
+    """Distances from a problem's start through its free space; see ``distance_field``.
+
+    Raises InputError where the problem has a travel model.
+    """
+    if problem.travel is not None:
+        raise InputError(
+            f"travel={problem.travel.name!r}: distance fields know lengths alone, so far; leave "
+            "the travel model out, or plan to each place with planner a-star"
+        )
     surface = problem.surface
     chosen = problem.default_spacing if spacing is None else spacing
     lattice = Lattice.spanning(problem.bounds, chosen)
