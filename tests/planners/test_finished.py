@@ -12,10 +12,10 @@ from terrapath.errors import UnfinishedWarning
 from terrapath.planners import (
     PLANNERS,
     Finished,
+    candidates,
     finish,
     finished,
     make_finished,
-    optimal,
 )
 from terrapath.planners.base import PROVING, REFINING, SEARCHING
 
@@ -216,7 +216,7 @@ def test_optimal_says_when_the_finest_lattice_was_not_enough(problem, monkeypatc
 
 @pytest.mark.parametrize("stage", ["march_both", "routes_of_fields"])
 def test_ctrl_c_while_optimal_looks_for_routes(stage, problem, monkeypatch):
-    monkeypatch.setattr(optimal, stage, interrupt)
+    monkeypatch.setattr(candidates, stage, interrupt)
     solution = tp.Optimal().solve(problem)
     assert solution.status is tp.Status.INTERRUPTED
     assert solution.stopped_by == "interrupt"
@@ -236,7 +236,7 @@ def test_ctrl_c_while_optimal_proves_keeps_the_routes(problem, monkeypatch):
 
 
 def test_optimal_keeps_fast_marchings_path_where_no_route_can_be_refined(problem, monkeypatch):
-    monkeypatch.setattr(optimal, "routes_of_fields", fail)
+    monkeypatch.setattr(candidates, "routes_of_fields", fail)
     with pytest.warns(UnfinishedWarning, match="ArithmeticError: by zero"):
         solution = tp.Optimal(target_gap=0.1).solve(problem)
     assert solution.length == pytest.approx(TRUTH, rel=1e-2)  # unrefined
