@@ -66,6 +66,11 @@ def test_the_best_potential_is_far_nearer_than_a_field(height):
     assert best < (0.01 if height == 3.0 else 0.05)
 
 
+def test_on_steep_ground_a_norm_is_asked_for_that_projections_can_reach():
+    # When 1.0004 was asked for, projections undid one another, and 1.019 was left.
+    assert potential(rough(height=20.0), gap=1e-3).norm < 1.016
+
+
 def test_smooth_ground_keeps_to_fields():
     for problem in (tp.scenes.load("six-peaks"), rough(side=40)):
         assert not is_rough(problem, problem.bounds)

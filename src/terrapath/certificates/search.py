@@ -53,8 +53,8 @@ SEARCHED = 0.7
 FEWEST_CELLS = 60
 
 # No lattice has more nodes than this. By default a plan's bound is searched for until its gap is
-# good, on lattices with up to the second number: two seconds of one core, but by no clock.
-MOST_NODES, FEW_NODES, GOOD_GAP = 6_000_000, 160_000, 1e-3
+# good, on lattices with up to the second number: seconds of one core, but by no clock.
+MOST_NODES, FEW_NODES, GOOD_GAP = 6_000_000, 320_000, 1e-3
 
 # The window of a search is never smaller than this share of the bounds' longer side.
 SMALLEST_WINDOW = 1e-6

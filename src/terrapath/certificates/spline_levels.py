@@ -29,18 +29,22 @@ FEW_NODES = 50_000
 
 # The ratios of the two steps and how many iterations each has: until objective and flow agree to
 # this share, after that, and before a proof.
-BEGIN, AGREED, MOST_BEGINNINGS = (20, 0.03), 0.02, 15
+BEGIN, AGREED, MOST_BEGINNINGS = (20, 0.03), 0.04, 15
 GO_ON, LAST = ((20, 0.1), (20, 0.3)), ((20, 1.0), (20, 3.0), (20, 10.0))
 
-# The norm asked for is above 1 by this share of the largest excess that is left, and by no more
-# than this share of the gap that is asked for.
-EASE, OF_GAP = 0.2, 0.4
+# The norm asked for is above 1 by this share of the largest excess that is left; by no less than
+# this share of the gap that is asked for, between two limits; and by no more than the last number.
+# Where it is asked to be far lower than the search made it, projections undo one another.
+EASE, OF_GAP, LEAST_EASE, MOST_OF_GAP, MOST_EASE = 0.2, 0.5, 1e-4, 5e-4, 1e-2
 
-# Cells that the checker cannot prove to have nearly that norm are looked at in so many parts.
-# Nearly is within this share of the gap, or between these.
-NEARLY, LEAST_NEARLY, MOST_NEARLY = 0.2, 1e-4, 3e-4
-# That ends where it would be more places than so many a cell of the lattice.
-PARTS, MOST_PLACES = (8, 16, 32, 32), 8
+# Cells that the checker cannot prove to be within so much more of what is asked for are looked at
+# in so many parts, from the second round on. Where a gap as this one is asked for, the first few
+# rounds will do.
+NEARLY, PARTS = 0.6, (4, 16, 32, 32)
+QUICK_GAP, QUICK_ROUNDS = 1e-3, 2
+
+# The rounds end where it would be more places than so many a cell of the lattice.
+MOST_PLACES = 8
 
 # No core is larger than this, in cells of a lattice finer than knots.
 CORE = 4
@@ -173,14 +177,19 @@ def _run(search: SplineSearch, is_last: bool, must_stop: MustStop) -> None:
         search.iterate(count, ratio, must_stop)
 
 
+def _ease(excess: float, target_gap: float) -> float:
+    """How far above 1 the norm that is asked for is."""
+    wanted = min(max(OF_GAP * target_gap, LEAST_EASE), MOST_OF_GAP)
+    return min(max(EASE * excess, wanted), MOST_EASE)
+
+
 def _certified(search: SplineSearch, target_gap: float, must_end: MustStop) -> Certificate:
     """The certificate of u, once its norm is lowered where the checker cannot prove enough."""
     problem, c = search.problem, search.c.copy()
     cells = np.zeros((0, 2), np.int64)
-    nearly = min(max(NEARLY * target_gap, LEAST_NEARLY), MOST_NEARLY)
-    target = 1.0 + max(min(EASE * search.excess, OF_GAP * target_gap), nearly)
-    enough, best = target + nearly, None
-    for parts in PARTS:
+    ease = _ease(search.excess, target_gap)
+    target, enough, best = 1.0 + ease, 1.0 + (1.0 + NEARLY) * ease, None
+    for parts in PARTS[: QUICK_ROUNDS if target_gap >= QUICK_GAP else None]:
         search.project(c, cells, parts, target, must_end)
         claim = search.claim(c)
         needs = cell_needs(problem, claim, enough, must_end)

@@ -36,7 +36,7 @@ class Finished:
     """A planner whose paths are refined, and whose solutions get a lower bound.
 
     refine : take the path to the locally shortest one. bound : prove a lower bound on the
-    length of every path, by about two seconds' work. target_gap : improve the bound until
+    length of every path, by some seconds' work. target_gap : improve the bound until
     (length - bound) / bound is no more than this; it implies ``bound``. time_limit : seconds
     for the planner and the finishing together; a fifth of it is kept for the bound where one is
     asked for. When time is up, the solution has the path and the bound that there are: a path
@@ -155,7 +155,7 @@ def with_bound(
     With a travel model the bound is the chord: the straight line of constant grade.
 
     target_gap : improve the bound until the gap is no more than this; by default until a tenth of a
-    percent, or for about two seconds' work, by no clock. time_limit : seconds.
+    percent, or for some seconds' work, by no clock. time_limit : seconds.
     ``callback`` sees each bound, and ends the search for a better one by returning True.
     After Ctrl-C the best bound proven so far is kept, if there is one.
     """
