@@ -180,12 +180,13 @@ def test_the_bound_is_rehearsed_and_waited_for_when_it_is_begun(surface_class, r
     }
 
 
-@pytest.mark.parametrize(("arguments", "waits"), [([], ["wait"]), (["--no-bound"], [])])
+@pytest.mark.parametrize(("arguments", "waits"), [([], True), (["--no-bound"], False)])
 def test_a_plan_waits_for_it_before_the_bound(arguments, waits, recorder, capsys):
     asked = ["plan", "six-peaks", "--samples", "200", "--json", "--quiet", *arguments]
     assert run(asked) == 0
     assert json.loads(capsys.readouterr().out)["status"] == "solved"
-    assert [told for told in recorder if told == "wait"] == waits
+    # Each sign of progress of the proof waits; only the first has anything to wait for.
+    assert ("wait" in recorder) is waits
 
 
 # Whole processes
