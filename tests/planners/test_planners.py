@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import math
 import os
 import signal
@@ -15,7 +14,14 @@ import shapely
 
 import terrapath as tp
 from planner_oracles import TREE_PLANNERS
-from terrapath.planners import PLANNERS, Progress, make_planner, rrt_star
+from terrapath.planners import (
+    PLANNERS,
+    Progress,
+    candidates,
+    fast_marching,
+    make_planner,
+    rrt_star,
+)
 from terrapath.problem import scenes
 
 EVERY_PLANNER = pytest.mark.parametrize("name", TREE_PLANNERS)
@@ -196,9 +202,10 @@ def test_rrt_ends_as_soon_after_the_first_path_as_it_says(problem):
     assert f"within {rrt_star.CHUNK} samples of the first path" in tp.RRT.__doc__
 
 
-@pytest.mark.parametrize("name", ["fast-marching", "optimal"])
-def test_where_the_nodes_show_no_way_finer_ones_are_tried(name, enclosed, monkeypatch):
-    module = importlib.import_module(f"terrapath.planners.{name.replace('-', '_')}")
+@pytest.mark.parametrize(
+    ("name", "module"), [("fast-marching", fast_marching), ("optimal", candidates)]
+)
+def test_where_the_nodes_show_no_way_finer_ones_are_tried(name, module, enclosed, monkeypatch):
     prepare, nodes = module.Medium, []
 
     def prepare_and_note(surface, lattice, *more):

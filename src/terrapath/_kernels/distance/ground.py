@@ -256,11 +256,16 @@ class Place(NamedTuple):
     b: float
 
 
+# Half-way between two samples the quadratics around both differ, and rays lead there again and
+# again. A place this near to it belongs to the upper sample, so that rounding does not choose.
+MIDDLE = 0.5 + 1e-9
+
+
 @inner_kernel
 def place_at(ground, x, y):
     """The weights of the quadratic through the samples around (x, y), in samples."""
-    i = min(max(int(x + 0.5), 1), ground.heights.shape[2] - 2)
-    j = min(max(int(y + 0.5), 1), ground.heights.shape[1] - 2)
+    i = min(max(int(x + MIDDLE), 1), ground.heights.shape[2] - 2)
+    j = min(max(int(y + MIDDLE), 1), ground.heights.shape[1] - 2)
     a, b = x - i, y - j
     return Place(
         i,
