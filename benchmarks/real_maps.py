@@ -25,6 +25,7 @@ import rasterio
 from pyproj import Transformer
 
 import terrapath as tp
+from terrapath.io.points import is_number
 from terrapath.space.slope_limit import SlopeLimit
 
 Floats = npt.NDArray[np.float64]
@@ -250,16 +251,8 @@ def walked(heights: Path, start: Floats, goal: Floats, scratch: Path) -> Floats:
     run("grass", "-c", placed, scratch / "grass", "-e")
     run("grass", scratch / "grass" / "PERMANENT", "--exec", "bash", script)
     words = [line.split() for line in out.read_text(encoding="utf-8").splitlines()]
-    points = [(float(w[0]), float(w[1])) for w in words if len(w) == 2 and _is_number(w[0])]
+    points = [(float(w[0]), float(w[1])) for w in words if len(w) == 2 and is_number(w[0])]
     return np.array(points)[::-1]
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def walk_row(made: RealMap, folder: Path, scratch: Path) -> list[str]:

@@ -1,12 +1,11 @@
 """Planners that other packages announce by an entry point."""
 
-import importlib
-
 import pytest
 
 import terrapath as tp
+from packages import installed_package
 from terrapath.cli.main import run
-from terrapath.planners import PLANNERS, registry
+from terrapath.planners import PLANNERS
 
 MODULE = '''
 import dataclasses
@@ -38,17 +37,9 @@ rrt = straight_planner:Straight
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """A package that announces planners, as pip lays it out."""
-    (tmp_path / "straight_planner.py").write_text(MODULE)
-    about = tmp_path / "straight_planner-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: straight-planner\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text(ENTRIES)
-    monkeypatch.syspath_prepend(tmp_path)
-    importlib.invalidate_caches()
-    registry._plug_ins.cache_clear()
-    yield
-    registry._plug_ins.cache_clear()
+    """A package that announces planners."""
+    with installed_package(tmp_path, monkeypatch, "straight_planner", MODULE, ENTRIES):
+        yield
 
 
 def test_a_plug_in_is_planned_with_by_its_name_and_options(installed):

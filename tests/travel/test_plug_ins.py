@@ -1,13 +1,11 @@
 """Travel models that other packages announce by an entry point."""
 
-import importlib
-
 import pytest
 
 import terrapath as tp
 from common import FLAT, REGION, one_line
+from packages import installed_package
 from terrapath.cli.main import run
-from terrapath.travel import registry
 
 MODULE = """
 import terrapath as tp
@@ -28,17 +26,9 @@ tobler = snow_travel:snowshoes
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """A package that announces models, as pip lays it out."""
-    (tmp_path / "snow_travel.py").write_text(MODULE)
-    about = tmp_path / "snow_travel-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: snow-travel\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text(ENTRIES)
-    monkeypatch.syspath_prepend(tmp_path)
-    importlib.invalidate_caches()
-    registry.plug_ins.cache_clear()
-    yield
-    registry.plug_ins.cache_clear()
+    """A package that announces models."""
+    with installed_package(tmp_path, monkeypatch, "snow_travel", MODULE, ENTRIES):
+        yield
 
 
 def test_a_plug_in_is_travelled_with_by_its_name_and_options(installed):

@@ -175,7 +175,7 @@ def _of_text(path: Path) -> tuple[Array, CRS | None]:
         separator = next((mark for mark in ",;\t" if mark in first), None)
         names = next(csv.reader([first], delimiter=separator or " "))
         columns, skipped = [0, 1, 2], 0
-        if not all(map(_is_number, (name for name in names if name.strip()))):
+        if not all(map(is_number, (name for name in names if name.strip()))):
             columns, skipped = _columns_of([name.strip().lower() for name in names], path), 1
     rows = np.loadtxt(
         path, delimiter=separator, skiprows=skipped, usecols=columns, ndmin=2, encoding="utf-8-sig"
@@ -183,7 +183,8 @@ def _of_text(path: Path) -> tuple[Array, CRS | None]:
     return rows, None
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Is a text a number?"""
     try:
         float(text)
     except ValueError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache, partial
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
@@ -37,24 +37,18 @@ _REGISTERED: dict[str, tuple[str, str, dict[str, Any]]] = {
 PLUG_INS = "terrapath.planners"
 
 
-@cache
 def _plug_ins() -> dict[str, EntryPoint]:
     """The planners of other packages by their names; none takes the name of one of ours."""
-    from importlib.metadata import entry_points
+    from .._support.plug_ins import announced
 
-    return {e.name: e for e in entry_points(group=PLUG_INS) if e.name not in _REGISTERED}
+    return {entry.name: entry for entry in announced(PLUG_INS) if entry.name not in _REGISTERED}
 
 
 def _of_plug_in(entry: EntryPoint) -> type[Planner]:
     """The class that an entry point names. Raises InputError where it cannot be used."""
-    try:
-        kind = entry.load()
-    except Exception as error:  # another package may raise anything while it is imported
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(
-            f"planner {entry.name!r} of {entry.value} cannot be loaded: {reason:.200}; repair or "
-            "uninstall its package"
-        ) from None
+    from .._support.plug_ins import loaded
+
+    kind = loaded(entry, f"planner {entry.name!r}")
     if not (isinstance(kind, type) and dataclasses.is_dataclass(kind) and hasattr(kind, "solve")):
         raise InputError(
             f"planner {entry.name!r} of {entry.value} is no planner: it must be a frozen dataclass "

@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from .._kernels.travel.paces import Pace, evaluate_jets
-from .._kernels.travel.priced import PricedPeaks, PricedSpline
+from .._kernels.travel.priced import Price, PricedPeaks, PricedSpline
 from ..errors import InputError
 from ..space.lattice import Lattice, Spacing
 from ..surface import Surface, metric
@@ -156,8 +156,8 @@ def _with_pace(surface: Surface, model: TravelModel, ground: Ground) -> Surface:
     used = model if _has_costs(surface) else model.gauged()
     least = max(_least(used) * (1.0 - NOTHING), 1e-100) * ground.metres
     pace, data = _scaled(used.pace, ground.metres), surface.data
-    soft = {"jumps": _jumps(pace), "width": 0.0, "share": 0.0}
-    fields = data._asdict() | {"pace": pace, "least": least, **soft}
+    price = Price(pace, least, _jumps(pace), width=0.0, share=0.0)
+    fields = data._asdict() | {"price": price}
     made = PricedSpline(**fields) if is_spline(data) else PricedPeaks(**fields)
     return replace(surface, data=cast("Any", made))
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Collection, Mapping
 from difflib import get_close_matches
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from .._support.plug_ins import announced, loaded
 from ..errors import InputError
 from .energy import llobera_sluckin, minetti, pandolf
 from .model import TravelModel
@@ -39,26 +39,15 @@ EXAMPLES: dict[str, Mapping[str, Any]] = {"vehicle": {"mass": 1000.0, "rolling_r
 PLUG_INS = "terrapath.travel"
 
 
-@cache
 def plug_ins() -> dict[str, EntryPoint]:
     """The models of other packages by their names; none takes the name of one of ours."""
-    from importlib.metadata import entry_points
-
-    found = {entry.name.replace("-", "_"): entry for entry in entry_points(group=PLUG_INS)}
+    found = {entry.name.replace("-", "_"): entry for entry in announced(PLUG_INS)}
     return {name: entry for name, entry in found.items() if name not in MODELS}
 
 
 def _of_plug_in(entry: EntryPoint) -> Maker:
     """The function that an entry point names. Raises InputError where it cannot be used."""
-    try:
-        maker = entry.load()
-        inspect.signature(maker)
-    except Exception as error:  # another package may raise anything while it is imported
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(
-            f"travel={entry.name!r} of {entry.value} cannot be loaded: {reason:.200}; repair or "
-            "uninstall its package"
-        ) from None
+    maker = loaded(entry, f"travel={entry.name!r}", inspect.signature)
 
     def made(**options: Any) -> TravelModel:
         model = maker(**options)

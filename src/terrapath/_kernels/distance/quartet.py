@@ -17,8 +17,8 @@ from .segments import End, Segment
 from .star import X, Y, beside, bits_of, cost_along
 
 # A node, the number of the sample at it, its column and row, and how far these are from the source,
-# in nodes. The directions of the
-# edge that offers least, and of the next edges on both sides and on the side that is chosen.
+# in nodes. The directions of the edge that offers least, and of the next edges on both sides and on
+# the side that is chosen.
 MEMBER = record(
     ("n", np.int64),
     ("at", np.int64),

@@ -106,7 +106,7 @@ def pair_of_chords(pace, size, z0, z1, z2):
 @kernel
 def priced_piece(surface, ax, ay, bx, by):
     vx, vy = bx - ax, by - ay
-    size, weight, pace = math.sqrt(vx * vx + vy * vy), surface.weights[0], surface.pace
+    size, weight, pace = math.sqrt(vx * vx + vy * vy), surface.weights[0], surface.price.pace
     if size == 0.0:
         return 0.0
     a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..surface.surfaces import jet_at, log_cost_at, put_jet
-from ..travel.paces import Pace, pace_jet
+from ..travel.paces import pace_jet
+from ..travel.priced import Price
 from .blocks import Block, put_squared_cost
 
 
@@ -27,10 +28,7 @@ class PacedStrand(NamedTuple):
     chords: np.ndarray  # (m - 1, 3): the pieces: both steps on the plane, and the rise
     stiffness: np.ndarray  # (m - 1,): the mean of c^2 at the ends of each piece
     pieces: np.ndarray  # (m - 1, PIECE): see below
-    pace: Pace
-    jumps: np.ndarray  # (k,): of the slope at the kinks of the pace
-    width: float  # of a softened kink, in grades
-    share: float  # of the length that is added, cost per map unit
+    price: Price
 
 
 # Entries of a row of PacedStrand.pieces.
@@ -54,18 +52,19 @@ class Softened(NamedTuple):
 
 @kernel
 def softened(strand, grade):
-    jet, pace = pace_jet(strand.pace, grade), strand.pace
+    price, pace = strand.price, strand.price.pace
+    jet = pace_jet(pace, grade)
     value, slope, curvature = jet.value, jet.slope, jet.curvature
     for k in range(len(pace.kinks)):
-        apart, half = grade - pace.kinks[k], 0.5 * strand.jumps[k]
-        root = math.sqrt(apart * apart + strand.width * strand.width)
+        apart, half = grade - pace.kinks[k], 0.5 * price.jumps[k]
+        root = math.sqrt(apart * apart + price.width * price.width)
         value += half * (root - abs(apart))
         slope += half * (apart / root - (1.0 if apart >= 0.0 else -1.0))
-        curvature += half * strand.width * strand.width / (root * root * root)
+        curvature += half * price.width * price.width / (root * root * root)
     root = math.sqrt(1.0 + grade * grade)
-    value += strand.share * root
-    slope += strand.share * grade / root
-    curvature += strand.share / (root * root * root)
+    value += price.share * root
+    slope += price.share * grade / root
+    curvature += price.share / (root * root * root)
     return Softened(value, slope, curvature)
 
 

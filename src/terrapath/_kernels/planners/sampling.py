@@ -65,8 +65,8 @@ def metric_chords(surface, tree, x, y, from_start, to_goal):
 def priced_chords(surface, tree, x, y, from_start, to_goal):
     z = surface.weights[0] * value_at(surface, 0, spot_at(surface, x, y))
     up, on = z - tree.places[0, LIFTED], tree.places[tree.counters[GOAL], LIFTED] - z
-    to_here = pace_along(surface.pace, math.sqrt(from_start), up)
-    return to_here + pace_along(surface.pace, math.sqrt(to_goal), on)
+    to_here = pace_along(surface.price.pace, math.sqrt(from_start), up)
+    return to_here + pace_along(surface.price.pace, math.sqrt(to_goal), on)
 
 
 @per_price(metric_chords, priced_chords)

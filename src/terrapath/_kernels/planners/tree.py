@@ -119,7 +119,7 @@ def metric_chord_over(surface, graph, a, b, squared):
 @inner_kernel
 def priced_chord_over(surface, graph, a, b, squared):
     rise = graph.places[b, LIFTED] - graph.places[a, LIFTED]
-    return graph.floor * pace_along(surface.pace, math.sqrt(squared), rise)
+    return graph.floor * pace_along(surface.price.pace, math.sqrt(squared), rise)
 
 
 @per_price(metric_chord_over, priced_chord_over)
@@ -175,7 +175,7 @@ def surveyed_norm(surface, vertex, dx, dy):
 @inner_kernel
 def surveyed_cost(surface, vertex, dx, dy):
     rise = vertex.h12 * dx + vertex.h22 * dy
-    return vertex.h11 * pace_along(surface.pace, math.sqrt(dx * dx + dy * dy), rise)
+    return vertex.h11 * pace_along(surface.price.pace, math.sqrt(dx * dx + dy * dy), rise)
 
 
 @per_price(surveyed_norm, surveyed_cost)

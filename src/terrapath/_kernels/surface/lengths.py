@@ -104,7 +104,7 @@ def priced_chord(surface, ax, ay, bx, by):
     a, b = spot_at(surface, ax, ay), spot_at(surface, bx, by)
     rise = surface.weights[0] * (value_at(surface, 0, b) - value_at(surface, 0, a))
     size = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
-    return floor_of(surface) * pace_along(surface.pace, size, rise)
+    return floor_of(surface) * pace_along(surface.price.pace, size, rise)
 
 
 @per_price(metric_chord, priced_chord)
@@ -170,7 +170,7 @@ def hidden_kink(surface, x, y, vx, vy):
     first = surface.weights[0] * slope_along(surface, 0, a, vx, vy) / size
     last = surface.weights[0] * slope_along(surface, 0, b, vx, vy) / size
     cost = sqrt(max(squared_cost_at(surface, a), squared_cost_at(surface, b)))
-    return cost * size * hidden_bend(surface.pace, first, last)
+    return cost * size * hidden_bend(surface.price.pace, first, last)
 
 
 @per_price(nothing_hidden, hidden_kink)

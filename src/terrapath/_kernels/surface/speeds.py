@@ -24,7 +24,7 @@ def metric_speed(surface, x, y, vx, vy):
 def priced_speed(surface, x, y, vx, vy):
     spot = spot_at(surface, x, y)
     rise = surface.weights[0] * slope_along(surface, 0, spot, vx, vy)
-    cost = pace_along(surface.pace, math.sqrt(vx * vx + vy * vy), rise)
+    cost = pace_along(surface.price.pace, math.sqrt(vx * vx + vy * vy), rise)
     return sqrt(squared_cost_at(surface, spot)) * cost
 
 

@@ -16,17 +16,23 @@ from ..surface.surfaces import Peaks, Spline
 from .paces import Pace
 
 
+class Price(NamedTuple):
+    """A pace on a surface, and how its kinks are softened where a path is pulled taut."""
+
+    pace: Pace
+    least: float  # P is nowhere below it
+    jumps: np.ndarray  # (k,): of the slope at its kinks
+    width: float  # of a softened kink, in grades
+    share: float  # of the length that is added, cost per map unit
+
+
 class PricedPeaks(NamedTuple):
     """Exact peaks with a pace."""
 
     peaks: np.ndarray
     first: np.ndarray
     weights: np.ndarray
-    pace: Pace
-    least: float  # P is nowhere below it
-    jumps: np.ndarray  # of the slope at its kinks
-    width: float  # that a kink has where a path is pulled taut, in grades
-    share: float  # of the length that is added there, cost per map unit
+    price: Price
 
     plain = Peaks  # type: ignore[misc]
 
@@ -43,11 +49,7 @@ class PricedSpline(NamedTuple):
     log_cost: np.ndarray
     cells: CostCells
     floor: float
-    pace: Pace
-    least: float  # P is nowhere below it
-    jumps: np.ndarray  # of the slope at its kinks
-    width: float  # that a kink has where a path is pulled taut, in grades
-    share: float  # of the length that is added there, cost per map unit
+    price: Price
 
     plain = Spline  # type: ignore[misc]
 
@@ -79,7 +81,7 @@ def one(surface):
 
 @inner_kernel
 def least_pace(surface):
-    return surface.least
+    return surface.price.least
 
 
 @per_price(one, least_pace)

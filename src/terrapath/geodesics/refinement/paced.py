@@ -34,12 +34,13 @@ def with_width(surface: Surface, width: float) -> Surface:
     """A surface with a pace whose kinks are so wide, in grades."""
     data: Any = surface.data
     level = float(np.interp(0.0, *_at_knots(data)))
-    return replace(surface, data=data._replace(width=width, share=width * level))
+    price = data.price._replace(width=width, share=width * level)
+    return replace(surface, data=data._replace(price=price))
 
 
 def _at_knots(data: Any) -> tuple[Array, Array]:
     """The knots of a pace, and about its values there."""
-    pace = data.pace
+    pace = data.price.pace
     slopes, intercepts = pace.slopes[:, None], pace.intercepts[:, None]
     return pace.knots, np.asarray((intercepts + slopes * pace.knots).max(axis=0))
 
@@ -56,10 +57,7 @@ def paced_strand(surface: Surface, points: Array) -> PacedStrand:
         np.empty((m - 1, 3)),
         np.empty(m - 1),
         np.empty((m - 1, PIECE)),
-        data.pace,
-        data.jumps,
-        data.width,
-        data.share,
+        data.price,
     )
 
 
