@@ -33,10 +33,10 @@ def problem_of(seed, count=24, steep=0.0, **options):
     )
 
 
-def blocked_cells(rows=slice(None), columns=slice(None)):
-    """Cells of a grid of 20 x 20 that may not be entered."""
+def blocked_cells(columns):
+    """Columns of a grid of 20 x 20 cells that may not be entered."""
     axis, blocked = 10.0 * np.arange(20), np.zeros((20, 20), bool)
-    blocked[rows, columns] = True
+    blocked[:, columns] = True
     return Mask(blocked, axis, axis)
 
 
@@ -105,10 +105,8 @@ def test_no_path_is_shorter_than_the_bound(seed, steep):
 
 def test_the_bound_is_near_where_much_of_the_cost_is_beside_the_goal():
     # A third of it, in one cell of 148; ground of 1 leads there.
-    random, axis = np.random.default_rng(15), CELL * np.arange(40)
-    costs = random_costs(random, 40)
-    surface = tp.read_surface((0.0 * costs, axis, axis), costs={"going": (costs, axis, axis)})
-    problem = tp.Problem(surface, (30.0, 34.0), (361.0, 347.0))
+    costs = random_costs(np.random.default_rng(15), 40)
+    problem = tp.Problem(cell_surface(costs), (30.0, 34.0), (361.0, 347.0))
     bound = tp.lower_bound(problem, length=772.7794081297905, target_gap=1e-3)
     assert bound.value >= 772.0
     bound.check(problem)
@@ -193,7 +191,7 @@ BESIDE = 145.0 - 1e-7
         ({"bounds": (40.0, 0.0, 145.0, 190.0)}, 145.0),
         ({"bounds": (40.0, 0.0, BESIDE, 190.0)}, BESIDE),
         ({"obstacles": [shapely.box(145.0, -10.0, 155.0, 200.0)]}, BESIDE),
-        ({"obstacles": [blocked_cells(columns=[15])]}, BESIDE),
+        ({"obstacles": [blocked_cells([15])]}, BESIDE),
     ],
 )
 def test_cells_that_cannot_be_entered_lend_no_cost_to_their_sides(options, x):

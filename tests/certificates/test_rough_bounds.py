@@ -16,7 +16,6 @@ from rough_maps import fractal, random_map
 from terrapath._kernels.certificates import spline_flow as kernels
 from terrapath.certificates import claims, spline_levels
 from terrapath.certificates.search import is_rough, lower_bound, search_window
-from terrapath.certificates.spline_flow import SplineSearch
 from terrapath.space.lattice import Lattice
 
 
@@ -91,7 +90,7 @@ def test_no_bound_is_above_a_path_among_obstacles_and_costs(seed):
     problem = random_map(seed).problem()
     path = path_of(problem)
     if path is None:
-        return
+        pytest.skip("no path leads there")
     for length in (path.length, math.inf):
         made = potential(problem, length)
         assert made.value <= path.length * (1.0 + ROUNDING)
@@ -260,4 +259,3 @@ def test_cores_are_as_large_as_asked_for():
         lattice = Lattice(problem.bounds, 90, 90)
         start, goal = (claims.Core(*block) for block in lattice.blocks_around(ends, most))
         assert start.column1 - start.column0 == goal.row1 - goal.row0 == 2 * most
-    assert isinstance(search_on(problem, Lattice(problem.bounds, 30, 30)), SplineSearch)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import combinations
 from typing import Any
 
 import mpmath
@@ -183,11 +182,3 @@ def unrolled_length(profile, start, goal):
     slopes = profile.weights[:, None] * np.einsum("ki,mi->km", profile.coefficients[:, 1], row)
     speed = np.sqrt(1.0 + (slopes**2).sum(axis=0)).reshape(half.shape[0], -1)
     return math.hypot(float((half * weights * speed).sum()), goal[1] - start[1])
-
-
-def cauchy_binet(gradients):
-    """det(I + sum g g^T) from the 2 x 2 minors: gradients (layers, m, 2)."""
-    total = 1.0 + (gradients**2).sum(axis=(0, 2))
-    for g, k in combinations(gradients, 2):
-        total = total + (g[:, 0] * k[:, 1] - g[:, 1] * k[:, 0]) ** 2
-    return total

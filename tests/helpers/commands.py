@@ -7,6 +7,8 @@ from terrapath.cli.main import run
 FAST = ["--samples", "300"]
 # What the planner found, and nothing more.
 RAW = ["--no-refine", "--no-bound"]
+# A plan that few kernels are compiled for.
+FEW_KERNELS = ["plan", "six-peaks", "--planner", "rrt-star", "--samples", "200", "--no-bound"]
 
 
 ENDS = ["--start", "500100,4000100", "--goal", "500400,4000300"]

@@ -26,6 +26,12 @@ Layers = Sequence[Sequence[Peak]]
 Point = tuple[float, float]
 
 
+def same_tree(a, b) -> bool:
+    """Have two solutions the same tree, bit by bit?"""
+    names = ("points", "parents", "costs")
+    return all(np.array_equal(getattr(a.tree, name), getattr(b.tree, name)) for name in names)
+
+
 # The surface
 
 

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import shapely
 from scipy.integrate import quad
 
 import terrapath as tp
@@ -10,6 +11,10 @@ import terrapath as tp
 SIDE = 1000.0
 PEAKS = [[(120.0, 4e-5, 350.0, 400.0), (-90.0, 3e-5, 700.0, 650.0), (60.0, 9e-5, 500.0, 800.0)]]
 BOUNDS = (0.0, 0.0, SIDE, SIDE)
+ENDS = (100.0, 150.0), (900.0, 850.0)
+WALL = shapely.box(480.0, 300.0, 520.0, 700.0)
+# The pace that makes the value of a path its length.
+SLOPE = tp.travel.from_function(lambda m: np.sqrt(1.0 + m * m), unit="m", beyond="switchbacks")
 
 
 def plane(gradient, along=0.0, cost=None):
@@ -33,6 +38,18 @@ def heading(degrees, size=400.0):
     step = 0.5 * size * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
     middle = np.array([0.5 * SIDE, 0.5 * SIDE])
     return tuple(middle - step), tuple(middle + step)
+
+
+def ways_round_the_wall(problem):
+    """On a plane, the values of the shortest paths south and north of ``WALL``."""
+    start, goal = problem.start, problem.goal
+    west, south, east, north = np.add(WALL.bounds, [-1e-5, -1e-5, 1e-5, 1e-5])
+    values = []
+    for y in (south, north):
+        bends = sorted([(west, y), (east, y)], reverse=start > goal)
+        stops = pairwise([start, *bends, goal])
+        values.append(sum(problem.between(a, b).chord for a, b in stops))
+    return values
 
 
 def slow_value(surface, model, points):

@@ -168,10 +168,8 @@ def test_stops_are_kept(tmp_path):
     points = ORIGIN + CELL * np.array([(5, 5), (20.25, 5), (40, 5), (60, 5.0)])
     problem = tp.Problem(surface, points[0], points[-1])
     legs = tuple(
-        made_up(tp.Problem(surface, *ends), ends) for ends in (points[:2], points[1:])
-        if len(ends) == 2
-    )  # fmt: skip
-    legs += (made_up(tp.Problem(surface, points[1], points[-1]), points[1:]),)
+        made_up(tp.Problem(surface, leg[0], leg[-1]), leg) for leg in (points[:2], points[1:])
+    )
     solution = made_up(problem, points, legs=legs)
     assert written_points(solution, tmp_path).tolist() == points[[0, 1, 3]].tolist()
 

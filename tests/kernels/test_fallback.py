@@ -10,6 +10,7 @@ import pytest
 from numba import config
 from numba.core.errors import TypingError
 
+from commands import FEW_KERNELS
 from common import ROOT, mostly_slow
 from kernel_copies import copy_machinery
 from processes import in_another_process
@@ -204,8 +205,7 @@ def test_a_kernel_that_is_wrong_itself_raises_its_own_error():
 
 @pytest.mark.slow
 def test_a_plan_with_a_version_that_is_not_tested(tmp_path, capsys):
-    few_kernels = ["--planner", "rrt-star", "--samples", "200", "--no-bound"]
-    wanted = ["plan", "six-peaks", *few_kernels, "--json"]
+    wanted = [*FEW_KERNELS, "--json"]
     assert run(wanted) == 0
     expected = json.loads(capsys.readouterr().out)
     newer = BROKEN["a newer version"][0]

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numba import config
 
+from commands import FEW_KERNELS
 from terrapath._kernels import cache
 from terrapath._kernels.compiler import cache_statistics, kernel
 from terrapath.errors import KernelWarning
@@ -361,9 +362,8 @@ def test_without_a_place_to_write_to_there_is_still_one_to_name(monkeypatch):
 def plan(folder, *arguments):
     """A plan in a process of its own, with its kernels in a folder: exit code, record, remarks."""
     command = [sys.executable, "-c", "from terrapath.cli import main; main()"]
-    few_kernels = ["--planner", "rrt-star", "--samples", "200", "--no-bound"]
     done = subprocess.run(
-        [*command, "plan", "six-peaks", *few_kernels, "--json", *arguments],
+        [*command, *FEW_KERNELS, "--json", *arguments],
         env={**os.environ, "NUMBA_CACHE_DIR": str(folder)},
         capture_output=True,
         text=True,

@@ -13,7 +13,7 @@ import pytest
 import shapely
 
 import terrapath as tp
-from planner_oracles import TREE_PLANNERS
+from planner_oracles import TREE_PLANNERS, same_tree
 from terrapath.planners import (
     PLANNERS,
     Progress,
@@ -40,14 +40,6 @@ def problem():
 def enclosed():
     surface = tp.Surface.from_peaks([scenes.FOUR_PEAKS])
     return tp.Problem(surface, scenes.START, (9.5, 9.5), scenes.REGION, [ROOM - SLIT])
-
-
-def same_tree(a, b):
-    return (
-        np.array_equal(a.tree.points, b.tree.points)
-        and np.array_equal(a.tree.parents, b.tree.parents)
-        and np.array_equal(a.tree.costs, b.tree.costs)
-    )
 
 
 # Every planner

@@ -5,10 +5,9 @@ import pytest
 
 import terrapath as tp
 from travel_judges import MODELS, cases, model_of
-from travel_problems import BOUNDS, heading, hills, plane, slow_value
+from travel_problems import BOUNDS, SLOPE, heading, hills, plane, slow_value
 
 each_model = pytest.mark.parametrize("name", MODELS)
-SLOPE = tp.travel.from_function(lambda m: np.sqrt(1.0 + m * m), unit="m", beyond="switchbacks")
 
 
 def made(name):
@@ -125,13 +124,13 @@ def test_switchbacks_are_told_by_their_share():
 def test_planes_beside_the_clone():
     for case in cases("plane"):
         gradient, model = case["surface"]["gradient"][0], model_of(case["pace"])
-        (ax, ay), (bx, by) = np.array([case["A"], case["B"]]) * 0.4
-        surface, scale = plane(gradient), 0.4
+        middle, scale = np.array([500.0, 500.0]), 0.4
+        move = scale * np.subtract(case["B"], case["A"])
         for sign, expected in ((1.0, case["A_to_B"]), (-1.0, case["B_to_A"])):
-            start = (500.0 + 0.0 * ax, 500.0 + 0.0 * ay)
-            goal = (500.0 + sign * (bx - ax), 500.0 + sign * (by - ay))
-            path = straight(tp.Problem(surface, start, goal, BOUNDS, travel=model))
-            assert path.value == pytest.approx(scale * expected, rel=1e-9, abs=1e-3)
+            goal = middle + sign * move
+            path = straight(tp.Problem(plane(gradient), middle, goal, BOUNDS, travel=model))
+            size = 1e-9 * path.gauged
+            assert path.value == pytest.approx(scale * expected, rel=1e-9, abs=size)
 
 
 # What is refused
