@@ -15,7 +15,7 @@ from processes import in_another_process
 from rough_maps import fractal, random_map
 from terrapath._kernels.certificates import spline_flow as kernels
 from terrapath.certificates import claims, spline_levels
-from terrapath.certificates.search import is_rough, lower_bound, search_window
+from terrapath.certificates.search import has_many_knots, lower_bound, search_window
 from terrapath.space.lattice import Lattice
 
 
@@ -54,7 +54,7 @@ def search_on(problem, lattice):
 @pytest.mark.parametrize("height", [3.0, 12.0])
 def test_the_best_potential_is_far_nearer_than_a_field(height):
     problem = rough(height=height)
-    assert is_rough(problem, problem.bounds)
+    assert has_many_knots(problem, problem.bounds)
     length = tp.plan(problem, "fast-marching", refine=True).length
     seen = []
     lower_bound(
@@ -72,7 +72,7 @@ def test_on_steep_ground_a_norm_is_asked_for_that_projections_can_reach():
 
 def test_smooth_ground_keeps_to_fields():
     for problem in (tp.scenes.load("six-peaks"), rough(side=40)):
-        assert not is_rough(problem, problem.bounds)
+        assert not has_many_knots(problem, problem.bounds)
 
 
 def test_finer_lattices_prove_more():

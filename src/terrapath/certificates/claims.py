@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from .._kernels.certificates import margins, norms as kernels
 from .._kernels.certificates.potentials import Potential
@@ -26,7 +25,7 @@ from ..space.lattice import Lattice
 from ..surface.bounds import Bounds
 from ..surface.layers import span_within
 from ..validation import Array, Point
-from .sides import margins_at_ends, matter_not, require_fit
+from .sides import Cells, costs_of, margins_at_ends, matter_not, require_fit
 
 # A relative margin, far above the rounding errors of the checker, far below any gap.
 ROUNDING = 1e-9
@@ -40,8 +39,6 @@ CHUNK = 32
 # The least norm: a function that is nearly flat proves nothing, and the squares of its slopes would
 # be rounded to 0.
 FLATTEST = 1e-3
-
-Cells = npt.NDArray[np.bool_]
 
 
 class Core(NamedTuple):
@@ -195,7 +192,8 @@ def _cutting(problem: Problem, lattice: Lattice) -> kernels.Cutting:
 def exempt_cells(problem: Problem, claim: Claim) -> Cells:
     """Cells (ny, nx) that no path meets between its cores, or at all where u is linear."""
     if is_linear(problem):
-        return matter_not(problem.surface.data, claim.lattice, problem.free_space)
+        costs = costs_of(problem.surface.data, claim.lattice)
+        return matter_not(costs, claim.lattice, problem.free_space)
     exempt = problem.free_space.covered_cells(claim.lattice)
     for core in (claim.start_core, claim.goal_core):
         exempt[core.row0 : core.row1, core.column0 : core.column1] = True
@@ -210,16 +208,23 @@ class Needs(NamedTuple):
     slope: Array  # the largest dual norm of du at those points
 
 
-def cell_needs(problem: Problem, claim: Claim, enough: float, must_stop: MustStop = never) -> Needs:
+def cell_needs(
+    problem: Problem,
+    claim: Claim,
+    enough: float,
+    must_stop: MustStop = never,
+    exempt: Cells | None = None,
+) -> Needs:
     """For each cell an M that is enough.
 
     That is: in the cell the dual norm of du is at most M, or every path through it is long enough,
     by the chord from there to the goal. enough : where an M as low as this is proven, no lower one
-    is looked for; nor for the cells that are left where it must stop.
+    is looked for; nor for the cells that are left where it must stop. exempt : of exempt_cells.
     """
     _require_fit(problem, claim)
     lattice, ground, potential = claim.lattice, _ground(problem), _potential(problem, claim)
-    exempt, cutting = exempt_cells(problem, claim), _cutting(problem, lattice)
+    exempt = exempt_cells(problem, claim) if exempt is None else exempt
+    cutting = _cutting(problem, lattice)
     found, likely, slope = needs = np.empty((3, lattice.ny - 1, lattice.nx - 1))
     given = (ground.surface, potential, ground.goal, float(claim.horizon))
     for j in range(len(found)):
@@ -316,16 +321,13 @@ def edge_margin(problem: Problem, claim: Claim, end: End, factor: float) -> floa
 
     The distance is at least the chord times the least cost around.
     """
-    core, anchor = end.core, _anchor(problem, claim, end)
+    anchor = _anchor(problem, claim, end)
     margin = margins.margin_of_core(
         _ground(problem).surface,
         _potential(problem, claim),
         anchor,
         float(factor),
-        core.column0,
-        core.column1,
-        core.row0,
-        core.row1,
+        *end.core,
         _cutting(problem, claim.lattice),
     )
     return float(margin) - anchor.floor * end.doubt
@@ -352,11 +354,8 @@ def proven_value(problem: Problem, claim: Claim, norm: float) -> float:
         end = End(claim.goal_core, problem.goal, goal, doubt)
         first = edge_margin(problem, claim, begin, -1.0 / norm)
         last = edge_margin(problem, claim, end, 1.0 / norm)
-    detour = (
-        least
-        * problem.bounds.least_detour(claim.bounds, problem.start, problem.goal)
-        * (1.0 - ROUNDING)
-    )
+    around = problem.bounds.least_detour(claim.bounds, problem.start, problem.goal)
+    detour = least * around * (1.0 - ROUNDING)
     rest = min(last, claim.horizon / norm - least * doubt)
     within = first + rest - ROUNDING * (abs(first) + abs(rest))
     # ``within`` is NaN where something overflowed; then the comparison is False.

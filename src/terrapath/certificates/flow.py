@@ -24,9 +24,9 @@ from ..surface.bounds import Bounds
 from ..surface.metric import inverse_metric_tensor, is_flat
 from ..validation import Array, Point
 from .certificate import Certificate, certify
-from .claims import Claim, Core, cell_needs
+from .claims import Claim, Core, Needs, cell_needs
 from .multigrid import Multigrid
-from .sides import costs_of, matter_not
+from .sides import Cells, costs_of, matter_not
 
 # The first lattice has two of its cells on a side of a cell of constant cost, where that makes no
 # more nodes than this; else one, or less, for the second number. Finer ones have up to the third.
@@ -107,9 +107,9 @@ class FlowSearch:
         coarser: FlowSearch | None = None,
     ) -> None:
         self.problem, self.lattice, self.must_stop = problem, lattice, must_stop
-        self.enough = length / (1.0 + target_gap)
+        self.length, self.target_gap = length, target_gap
         self.is_flat = is_flat(problem.surface, problem.bounds)
-        self.costs, self.roots = self._limits()  # what norms are measured by
+        self.costs, self.roots, self.exempt = self._limits()  # what norms are measured by
         self.tightened = self.costs.copy()  # what the flow is led by
         self.weights = 1.0 / np.minimum(self.costs, self.costs[self.costs < FREE].max())
         self.norms = np.empty_like(self.costs)
@@ -117,14 +117,14 @@ class FlowSearch:
         self.flow = np.zeros((*self.costs.shape, 2, 2))
         self.ratios = RATIOS if coarser is None else FINER_RATIOS
         self.best = -math.inf
-        self.u = self._between_fields(length) if coarser is None else self._refined(coarser)
+        self.u = self._between_fields() if coarser is None else self._refined(coarser)
         self._note()
 
-    def finer(self, length: float, target_gap: float) -> FlowSearch:
+    def finer(self) -> FlowSearch:
         """The search that goes on from here, with the cells of the lattice cut in four."""
         nx, ny = 2 * self.lattice.nx - 1, 2 * self.lattice.ny - 1
         lattice = Lattice(self.lattice.bounds, nx, ny)
-        return FlowSearch(self.problem, lattice, length, target_gap, self.must_stop, self)
+        return FlowSearch(self.problem, lattice, self.length, self.target_gap, self.must_stop, self)
 
     def _refined(self, coarser: FlowSearch) -> Array:
         """The same u and flow as on a coarser lattice; its best u is kept, too."""
@@ -137,7 +137,7 @@ class FlowSearch:
         kernels.refine(coarser.u, coarser.flow, coarser.rising, u[1], self.flow)
         return np.asarray(u[1])
 
-    def _between_fields(self, length: float) -> Array:
+    def _between_fields(self) -> Array:
         """Half the distance from the start minus half that to the goal, at the nodes."""
         from ..distance.field import march_both
         from ..distance.medium import Medium
@@ -146,6 +146,7 @@ class FlowSearch:
         inner, edges = _inside(self.lattice, bounds)
         medium = Medium(problem.surface, inner, problem.free_space, self.must_stop)
         fields = march_both(medium, problem.start, problem.goal, watch=lambda _: self.must_stop())
+        length = self.length
         if math.isinf(length):
             known = fields[0].values[np.isfinite(fields[0].values)]
             length = float(known.max(initial=0.0))
@@ -155,12 +156,15 @@ class FlowSearch:
         )
         return np.pad(0.5 * (begin - end), edges, mode="edge")
 
-    def _limits(self) -> tuple[Array, Array]:
-        """The cost c of each cell, per cell's side, and A without it: (ny, nx, 3), symmetric."""
+    def _limits(self) -> tuple[Array, Array, Cells]:
+        """The cost c of each cell, per cell's side; A without it: (ny, nx, 3), symmetric; and which
+        cells matter to no path.
+        """
         lattice, surface = self.lattice, self.problem.surface
         assert isinstance(surface.data, Spline)
         assert surface.bounds is not None
         costs = costs_of(surface.data, lattice)
+        exempt = matter_not(costs, lattice, self.problem.free_space)
         low, high = np.array(surface.bounds[:2]), np.array(surface.bounds[2:])
         middles = [0.5 * (at[1:] + at[:-1]) for at in (lattice.x, lattice.y)]
         centres = np.clip(np.stack(np.meshgrid(*middles), axis=-1), low, high)
@@ -170,8 +174,8 @@ class FlowSearch:
         unit = math.sqrt(lattice.dx * lattice.dy)
         inverse *= unit * unit / np.outer(lattice.spacing, lattice.spacing)
         costs *= smooth * unit
-        costs[matter_not(surface.data, lattice, self.problem.free_space)] = FREE
-        return costs, _roots(inverse)
+        costs[exempt] = FREE
+        return costs, _roots(inverse), exempt
 
     def _note(self) -> None:
         """Measure u, and keep it where it proves the most so far."""
@@ -187,7 +191,7 @@ class FlowSearch:
         if self.is_flat:
             kernels.fill_norms(self.u, self.roots, self.costs, self.rising, self.norms)
         else:
-            self.norms = cell_needs(self.problem, self._claim(self.u), 0.0).slope
+            self.norms = self._needs(self._claim(self.u), 0.0).slope
 
     @property
     def _ratio(self) -> float:
@@ -212,7 +216,7 @@ class FlowSearch:
     @property
     def is_done(self) -> bool:
         """Is the bound good enough, or must it stop?"""
-        return self.best >= self.enough or self.must_stop()
+        return self.best >= self.length / (1.0 + self.target_gap) or self.must_stop()
 
     def run(self) -> None:
         """Raise the bound until it is near enough."""
@@ -264,8 +268,11 @@ class FlowSearch:
         kernels.choose_diagonals(self.best_u, self._ratio, self.rising)
         begin = float((self._weights(self.problem.start) * self.best_u).sum())
         claim = self._claim(self.best_u - begin)
-        needs = cell_needs(self.problem, claim, FLAT_ENOUGH, must_end)
+        needs = self._needs(claim, FLAT_ENOUGH, must_end)
         return certify(self.problem, claim, needs, must_end)
+
+    def _needs(self, claim: Claim, enough: float, must_stop: MustStop = never) -> Needs:
+        return cell_needs(self.problem, claim, enough, must_stop, self.exempt)
 
 
 def _into_obstacles(values: Array, costs: Array, lattice: Lattice) -> Array:
@@ -344,4 +351,4 @@ def cell_certificates(
         level += 1
         if must_stop() or level > FINEST or 4 * search.u.size > MOST_FINER_NODES:
             return
-        search = search.finer(length, gap)
+        search = search.finer()

@@ -201,9 +201,10 @@ def certificates(
 
     length : of a path that is known, map units. target_gap : of the lower bound. The search goes
     on to the next finer lattice when the norm is too large by at most a quarter of the target
-    gap, or when a repair gains little. On rough ground the best potential is searched for after
-    the first lattice. most_nodes : no lattice but the first has more. Where it must stop, one last
-    certificate comes, proven as far as that goes before it must end.
+    gap, or when a repair gains little. Where the surface has many knots, the best potential is
+    searched for after the first lattice. most_nodes : no lattice but the first has more; where
+    costs are constant in cells, the search has limits of its own instead. Where it must stop, one
+    last certificate comes, proven as far as that goes before it must end.
     """
     window = search_window(problem, length)
     if problem.surface.cost_cells is not None:
@@ -228,7 +229,7 @@ def certificates(
         yield search.certify(must_end)
         if must_stop():
             return
-        if is_rough(problem, window):
+        if has_many_knots(problem, window):
             gap = target_gap or GOOD_GAP
             from .spline_levels import spline_certificates
 
@@ -236,8 +237,11 @@ def certificates(
             return
 
 
-def is_rough(problem: Problem, window: Bounds) -> bool:
-    """Has the surface so many knots that the best potential is searched for on these?"""
+def has_many_knots(problem: Problem, window: Bounds) -> bool:
+    """Is the surface a spline of at least FEWEST_CELLS cells along a side of the window?
+
+    Then the best potential is searched for on the spline's own cells.
+    """
     data = problem.surface.data
     if not isinstance(data, Spline):
         return False
@@ -258,11 +262,12 @@ def lower_bound(
     length : of a path that is known, map units. With it the search leaves out ground that no
     shorter path can visit. target_gap : the search stops when (length - bound) / bound is no more
     than this; by default, and where no path is known, it stops after the first, coarsest lattice.
-    most_nodes : of any lattice but the first. time_limit : seconds. watch : is called with each
-    certificate; returning True stops the search.
+    most_nodes : of any lattice but the first; it does not limit a search where costs are constant
+    in cells. time_limit : seconds. watch : is called with each certificate; returning True stops
+    the search.
     Returns the best certificate found, which compares with numbers by its value. Where time was up
     before the first one was proven, its bound may be no more than the chord.
-    Raises InputError for numbers that are not above 0.
+    Raises InputError for numbers that are not above 0, and for a problem with a travel model.
     """
     _check(length, target_gap, time_limit)
     if problem.travel is not None:

@@ -72,13 +72,13 @@ def costs_of(surface: Peaks | Spline, lattice: Lattice) -> Array:
     return costs
 
 
-def matter_not(surface: Peaks | Spline, lattice: Lattice, space: FreeSpace) -> Cells:
+def matter_not(costs: Array, lattice: Lattice, space: FreeSpace) -> Cells:
     """Which cells of a lattice (ny - 1, nx - 1) no path can enter, nor have the costs of.
 
-    A path may run along the side of a cell that is covered by an obstacle. Where that is cheaper
-    than one of the open cells around, the path has its cost.
+    costs : of ``costs_of``. A path may run along the side of a cell that is covered by an obstacle.
+    Where that is cheaper than one of the open cells around, the path has its cost.
     """
-    covered, costs = space.covered_cells(lattice, on_sides=True), costs_of(surface, lattice)
+    covered = space.covered_cells(lattice, on_sides=True)
     rows, columns = covered.shape
     around = np.pad(np.where(covered, 0.0, costs), 1)
     shifts = [around[j : j + rows, i : i + columns] for j in range(3) for i in range(3)]
