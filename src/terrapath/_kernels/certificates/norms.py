@@ -217,9 +217,9 @@ def need_of_cell(surface, potential, goal, horizon, i, j, cutting):
     return Need(proven, likely, slope, least)
 
 
-# A box is cut in four where that could lower M by this share, or roughly by the second one, and at
-# most this often. Models of
-# large boxes on rough ground are far above the truth, so what they find likely is no measure.
+# A box is cut in four where that could lower M by this share, or by the second one where M is
+# wanted only roughly, and at most so often. Models of large boxes on rough ground are far above the
+# truth, so what they find likely is no measure.
 WORTHWHILE, ROUGHLY = 2e-5, 3e-4
 DEPTH = 10
 

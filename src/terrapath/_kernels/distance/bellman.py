@@ -88,6 +88,19 @@ def toward(medium, n, k):
 
 
 @inner_kernel
+def row_of(medium, n):
+    """The row of a node."""
+    # A division of integers takes longer; the half keeps rounding away from whole numbers.
+    return int((n + 0.5) * medium.row_per_node)
+
+
+@inner_kernel
+def sample_at(medium, i, j):
+    """The number of the sample at the node in column i and row j."""
+    return 2 * medium.ground.pieces * (j * medium.columns + i)
+
+
+@inner_kernel
 def sample_toward(medium, at, k):
     """The number of the sample at the node that direction k leads to; at : of that at the node."""
     return at + 2 * medium.half_steps[index(k)]

@@ -16,6 +16,8 @@ class Front(NamedTuple):
     The nodes of a day are in the bucket whose number is the day modulo the number of buckets,
     and the least of the current day is searched for. With one or two nodes in a bucket that is
     several times faster than a heap, and as exact.
+
+    ``u`` and ``trial`` may be one array, of the values of settled and of queued nodes.
     """
 
     u: np.ndarray  # (n,) float64: values of settled nodes, infinite elsewhere

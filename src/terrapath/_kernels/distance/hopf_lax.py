@@ -13,7 +13,7 @@ import numpy as np
 from ..bits import lowest_bit
 from ..compiler import inner_kernel, kernel
 from ..prefetch import fetch
-from .bellman import chord_of, node_at, toward, value_at
+from .bellman import chord_of, node_at, row_of, sample_at, toward, value_at
 from .calendar_queue import DAY, QUEUED, any_of_day, dequeue, earliest, enqueue, list_of
 from .quartet import place_node
 from .star import BASE, EIGHTH, HALF, base_cost, bits_ahead, bits_back, bits_of, index, other_cost
@@ -127,8 +127,8 @@ def plant(front, state, seeds, values):
 @inner_kernel
 def fetch_around(medium, state, n):
     """Ask for what is known around a node."""
-    stars, j = medium.stars, int((n + 0.5) * medium.row_per_node)
-    at = 2 * medium.ground.pieces * (j * medium.columns + n - j * medium.grid.nx)
+    stars, j = medium.stars, row_of(medium, n)
+    at = sample_at(medium, n - j * medium.grid.nx, j)
     for layer in range(medium.samples.shape[0]):
         for row in range(-1, 2):
             fetch(medium.samples[layer], at + row * medium.columns)
@@ -175,11 +175,11 @@ def take_four(medium, front, state, source, first, most):
         if n < 0 or node_at(state, n).best == SEED:
             return count
         take(medium, front, state, source, nodes[count], n)
-    return max(min(most, 4), 1)
+    return min(most, 4)
 
 
 @inner_kernel
-def settle_four(medium, front, state, source, count):
+def settle_four(medium, state, source, count):
     """Settle the nodes that were taken."""
     nodes = state.quartet.nodes
     if nodes[0].a == SEED:
@@ -204,7 +204,7 @@ def march(medium, front, state, source, most, limit, in_order):
             return settled
         count = take_four(medium, front, state, source, n, 1 if in_order else most - settled)
         fetch_next(medium, front, state)
-        settle_four(medium, front, state, source, count)
+        settle_four(medium, state, source, count)
         settled += count
         for m in range(count):
             n = state.quartet.nodes[m].n

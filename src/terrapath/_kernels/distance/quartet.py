@@ -12,7 +12,7 @@ import numpy as np
 from ..compiler import inner_kernel
 from ..dtypes import record
 from ..vec4 import four, larger, sqrt, where_above
-from .bellman import height_at, is_clear, sample_toward, toward, value_at
+from .bellman import height_at, is_clear, row_of, sample_at, sample_toward, toward, value_at
 from .segments import End, Segment
 from .star import X, Y, beside, bits_of, cost_along
 
@@ -78,11 +78,10 @@ def fill_row(table, k, values):
 @inner_kernel
 def place_node(medium, source, node, n, a):
     """Fill a member with node n and the direction of its edge."""
-    # A division of integers takes longer; the half keeps rounding away from whole numbers.
-    j = int((n + 0.5) * medium.row_per_node)
+    j = row_of(medium, n)
     node.n, node.i, node.j = n, n - j * medium.grid.nx, j
     node.x, node.y, node.a = node.i - source.x, node.j - source.y, a
-    node.at = 2 * medium.ground.pieces * (j * medium.columns + node.i)
+    node.at = sample_at(medium, node.i, j)
 
 
 @inner_kernel

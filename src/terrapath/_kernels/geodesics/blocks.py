@@ -1,9 +1,10 @@
-"""2 x 2 matrices, of which Newton's steps are made, and the jet of the squared cost."""
+"""2 x 2 matrices, of which Newton's steps are made, and the surface's jets along a polyline."""
 
 import math
 from typing import NamedTuple
 
 from ..compiler import inner_kernel, kernel
+from ..surface.surfaces import jet_at, log_cost_at, put_jet
 
 
 class Block(NamedTuple):
@@ -62,3 +63,13 @@ def put_squared_cost(row, log):
     row[0], row[1], row[2] = c2, c2 * x, c2 * y
     row[3], row[4] = c2 * (2.0 * log.fxx + x * x), c2 * (2.0 * log.fxy + x * y)
     row[5] = c2 * (2.0 * log.fyy + y * y)
+
+
+@kernel
+def fill_jets(surface, strand):
+    """Fill the jets of the layers and of the squared cost at the points of a polyline."""
+    for m in range(strand.points.shape[0]):
+        x, y = strand.points[m, 0], strand.points[m, 1]
+        for layer in range(strand.weights.shape[0]):
+            put_jet(strand.jets[m, layer], jet_at(surface, layer, x, y))
+        put_squared_cost(strand.costs[m], log_cost_at(surface, x, y))

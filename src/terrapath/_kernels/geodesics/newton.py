@@ -12,9 +12,8 @@ import numpy as np
 
 from ..compiler import inner_kernel, kernel
 from ..dispatch import per_class
-from ..surface.surfaces import jet_at, log_cost_at, put_jet
 from ..travel.priced import per_price
-from .blocks import Block, confined, entry, inverse, product, put, put_squared_cost, transposed
+from .blocks import Block, confined, entry, fill_jets, inverse, product, put, transposed
 from .paced import (
     PacedStrand,
     lift_paced,
@@ -261,11 +260,7 @@ def fill_pieces(strand):
 
 @kernel
 def lift_metric(surface, strand):
-    for m in range(strand.points.shape[0]):
-        x, y = strand.points[m, 0], strand.points[m, 1]
-        for layer in range(strand.weights.shape[0]):
-            put_jet(strand.jets[m, layer], jet_at(surface, layer, x, y))
-        put_squared_cost(strand.costs[m], log_cost_at(surface, x, y))
+    fill_jets(surface, strand)
     return fill_pieces(strand)
 
 

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler import inner_kernel, kernel
-from ..surface.surfaces import jet_at, log_cost_at, put_jet
-from ..travel.paces import pace_jet
+from ..travel.paces import Jet, pace_jet
 from ..travel.priced import Price
-from .blocks import Block, put_squared_cost
+from .blocks import Block, fill_jets
 
 
 class PacedStrand(NamedTuple):
@@ -42,16 +41,9 @@ GRADE = 7
 PIECE = 8
 
 
-class Softened(NamedTuple):
-    """A pace with softened kinks and a share of length at a grade."""
-
-    value: float
-    slope: float
-    curvature: float
-
-
 @kernel
-def softened(strand, grade):
+def softened_jet(strand, grade):
+    """A pace with softened kinks and a share of length, with its derivatives at a grade."""
     price, pace = strand.price, strand.price.pace
     jet = pace_jet(pace, grade)
     value, slope, curvature = jet.value, jet.slope, jet.curvature
@@ -65,7 +57,7 @@ def softened(strand, grade):
     value += price.share * root
     slope += price.share * grade / root
     curvature += price.share / (root * root * root)
-    return Softened(value, slope, curvature)
+    return Jet(value, slope, curvature)
 
 
 @kernel
@@ -78,7 +70,7 @@ def fill_piece(strand, m):
             row[entry] = 0.0
         return 0.0
     grade = rise / size
-    jet = softened(strand, grade)
+    jet = softened_jet(strand, grade)
     row[COST], row[SLOPE], row[GRADE] = size * jet.value, jet.slope, grade
     row[INTERCEPT] = max(jet.value - grade * jet.slope, 0.0)
     row[ACROSS], row[ALONG] = row[INTERCEPT] / size, jet.curvature / size
@@ -102,11 +94,7 @@ def fill_paced_pieces(strand):
 
 @kernel
 def lift_paced(surface, strand):
-    """Evaluate the surface at the points of a polyline. Returns the polyline's energy."""
-    for m in range(strand.points.shape[0]):
-        x, y = strand.points[m, 0], strand.points[m, 1]
-        put_jet(strand.jets[m, 0], jet_at(surface, 0, x, y))
-        put_squared_cost(strand.costs[m], log_cost_at(surface, x, y))
+    fill_jets(surface, strand)
     return fill_paced_pieces(strand)
 
 
